@@ -3,9 +3,8 @@
 import importlib
 from typing import Any, cast
 
-import qtawesome
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
-from PySide6.QtGui import QCloseEvent, QFontDatabase, QGuiApplication, QHideEvent, QIcon
+from PySide6.QtGui import QCloseEvent, QFontDatabase, QGuiApplication, QHideEvent
 from PySide6.QtWidgets import (
     QApplication,
     QDialog,
@@ -26,6 +25,7 @@ from app.qt.settings_screen import SettingsScreen
 from app.qt.stand_screen import StandScreen
 from app.qt.start_screen import StartScreen
 from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
+from app.qt.widgets.icons import icon
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import HelpDialog, add_shortcut, bind_button, list_shortcuts
@@ -201,14 +201,6 @@ class MainWindow(QMainWindow):
         content = make_column(self._notice, (self._stack, 1))
         make_row(rail, (content, 1), of=middle)
         self.setCentralWidget(middle)
-
-
-def icon(name: str, colour: str, *, active: str = "") -> QIcon:
-    options = {"color": colour}
-    if active:
-        options["color_on"] = active
-    made: QIcon = qtawesome.icon(f"ph.{name}", **options)
-    return made
 
 
 _WORDS = {"bad": N_("Error"), "warn": N_("Note"), "ok": N_("Done"), "plain": ""}

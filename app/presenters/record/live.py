@@ -73,7 +73,10 @@ class LiveTraces:
     """On the time axis of the samples; None as long as they have not happened."""
     is_pulled: bool = False  # the table is being pulled or held
     side: int = 0  # side to which the table is pulled, or was pulled last: 1, -1, or 0 if unknown
-    is_held: bool = False
+    zoom_s: Span | None = None
+    """Part of the shown time axis that is in view; None is all of it."""
+    earlier: "LiveTraces | None" = None
+    """An earlier run whose traces are shown until `restarted`."""
     read_s: float = float("-inf")
     traces: Traces = field(default_factory=Traces)
     readings: LiveReadings = field(default_factory=LiveReadings)
@@ -85,7 +88,7 @@ class LiveTraces:
     @property
     def is_settled(self) -> bool:
         """Tell whether new samples change nothing that is drawn."""
-        return self.is_held or (self.end_s is not None and self.samples.end_s >= self.end_s)
+        return self.earlier is not None or (self.end_s is not None and self.samples.end_s >= self.end_s)
 
     def newest_m(self) -> Floats:
         """Mean of both gauges (2,) over the last `_MEAN_S`, as the gauges read; NaN without samples."""
@@ -94,22 +97,35 @@ class LiveTraces:
 
     def reconnected(self, gauges: Gauges) -> "LiveTraces":
         """Begin with another device; the drawn traces stay until samples come or `cleared`."""
-        return replace(LiveTraces.of_gauges(gauges), width_px=self.width_px, traces=self.traces)
+        return replace(
+            LiveTraces.of_gauges(gauges), width_px=self.width_px, zoom_s=self.zoom_s, traces=self.traces
+        )
 
     def cleared(self, pullback_m: float) -> "LiveTraces":
         return replace(self, traces=self._draw(pullback_m, None))
 
     def restarted(self) -> "LiveTraces":
         rolling = replace(self, release_s=None, slip_s=None, end_s=None)
-        return replace(rolling, zero_m=self.tare_m, is_pulled=False, is_held=False)
+        return replace(rolling, zero_m=self.tare_m, is_pulled=False, earlier=None)
 
     def stopped(self) -> "LiveTraces":
         """End the run with the newest sample, unless its end is known."""
         return self if self.end_s is not None else replace(self, end_s=self.samples.end_s)
 
-    def held(self, traces: Traces) -> "LiveTraces":
+    def with_earlier(self, earlier: "LiveTraces") -> "LiveTraces":
         """Show traces of an earlier run until `restarted`."""
-        return replace(self, is_held=True, traces=traces)
+        shown = replace(self, earlier=earlier.earlier or earlier, traces=earlier.traces)
+        return shown.zoomed(self.zoom_s)
+
+    def zoomed(self, zoom_s: Span | None) -> "LiveTraces":
+        """Draw a part of the shown time axis, or all of it, as finely as its pixels allow."""
+        changed = replace(self, zoom_s=zoom_s)
+        drawn = replace(self.earlier or self, width_px=self.width_px, zoom_s=zoom_s)
+        if not len(drawn.samples):  # traces of the device before stay
+            return changed
+        origin_s, _ = drawn._time_axis()
+        table, relative = drawn._lines(origin_s, zoom_s or self.traces.span)
+        return replace(changed, traces=replace(self.traces, table=table, relative=relative))
 
     def tared(self) -> "LiveTraces | None":
         """Count readings from where both gauges stand; None if they were not at rest for a second."""
@@ -179,12 +195,8 @@ class LiveTraces:
 
     def _draw(self, pullback_m: float, room: AllowedPlateRange | None) -> Traces:
         origin_s, span = self._time_axis()
-        last_s = min(origin_s + span[1], np.inf if self.end_s is None else self.end_s)
-        lines = self.samples.lines(origin_s + span[0], last_s + 1e-9, self.width_px)
-        table, relative = (
-            Polyline(line.time_s - origin_s, 1e3 * (line.value - zero_m))
-            for line, zero_m in zip(lines, self.zero_m, strict=True)
-        )
+        table, relative = self._lines(origin_s, span)
+        seen = (table, relative) if self.zoom_s is None else self._lines(origin_s, self.zoom_s)
         is_released = self.release_s is not None
         marks = TraceMarks(
             before_release=(-BEFORE_RELEASE_S, 0.0) if is_released else None,
@@ -196,14 +208,24 @@ class LiveTraces:
             plate_range_mm=None if room is None else self._shown_mm(1, room.low_m, room.high_m),
         )
         return Traces(
-            table=table,
-            relative=relative,
+            table=seen[0],
+            relative=seen[1],
             span=span,
             time_title=gettext("time from release, s") if is_released else gettext("time from now, s"),
             table_limit_mm=_limit_mm(table, pullback_m, marks.table_range_mm),
             relative_limit_mm=_limit_mm(relative, pullback_m, marks.relative_range_mm),
             marks=marks,
         )
+
+    def _lines(self, origin_s: float, span: Span) -> tuple[Polyline, Polyline]:
+        """Both channels in a part of the time axis."""
+        last_s = min(origin_s + span[1], np.inf if self.end_s is None else self.end_s)
+        lines = self.samples.lines(origin_s + span[0], last_s + 1e-9, self.width_px)
+        table, relative = (
+            Polyline(line.time_s - origin_s, 1e3 * (line.value - zero_m))
+            for line, zero_m in zip(lines, self.zero_m, strict=True)
+        )
+        return table, relative
 
     def _time_axis(self) -> tuple[float, Span]:
         now_s = self.samples.end_s if self.end_s is None else self.end_s

@@ -12,7 +12,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.navigator import StandContext
 from app.presenters.record.live import GaugeMonitor, LiveTraces
 from app.presenters.record.next_runs import NextRuns
-from app.presenters.record.state import Action, LiveEstimate, StatusBar, Traces
+from app.presenters.record.state import Action, LiveEstimate, StatusBar
 from app.presenters.results import FRICTION, Result, make_row
 from config.schema import Gauges
 from messages.i18n import gettext
@@ -159,7 +159,7 @@ class Snapshot:
     """Screen at the moment when the operator went on from a run; undo returns to it."""
 
     ended: EndedRun
-    traces: Traces
+    live: LiveTraces
     next_series: str
 
 

@@ -79,6 +79,8 @@ class _Reduction:
                     self._set_decisions(pending=replace(pending, edited_note=note))
             case state.PlotResized(width_px):
                 self._set(live=replace(model.live, width_px=max(width_px, live.PIXELS_MIN)))
+            case state.PlotZoomed(span):
+                self._set(live=model.live.zoomed(span))
             case TaskDone(task, answer):
                 self._on_task_done(task, answer)
             case AnalysedRun() | AnalysisFailed() | AnalysisProgress():
@@ -202,7 +204,7 @@ class _Reduction:
         if ended.result is None:
             self._set_decisions(to_keep=model.decisions.to_keep | {ended.event.path})
         elif ended.result.path:
-            self._set(snapshot=Snapshot(ended, model.live.traces, model.next_runs.series))
+            self._set(snapshot=Snapshot(ended, model.live, model.next_runs.series))
         run = self._decide()
         next_runs = model.next_runs.with_decision()
         if run is not None:
@@ -240,7 +242,7 @@ class _Reduction:
         if snapshot is None or snapshot.ended.result is None:
             return
         ended = replace(snapshot.ended, result=replace(snapshot.ended.result, path=run.path))
-        self._set(ended=ended, live=self.model.live.held(snapshot.traces))
+        self._set(ended=ended, live=self.model.live.with_earlier(snapshot.live))
         self._choose_series(snapshot.next_series)
         self._save(self.model.next_runs.with_undecided(run.path))
 

@@ -341,6 +341,13 @@ class PlotResized:
 
 
 @dataclass(frozen=True, slots=True)
+class PlotZoomed:
+    """Part of the shown time axis that is in view; None is all of it."""
+
+    span: Span | None
+
+
+@dataclass(frozen=True, slots=True)
 class Connecting:
     """A device is being connected; `waiting_for` names a process that is started first."""
 
@@ -361,6 +368,7 @@ RecordEvent = (
     | PlanEdited
     | NoteEdited
     | PlotResized
+    | PlotZoomed
     | Connecting
     | SimulationStarted
     | RingRows

@@ -1,6 +1,7 @@
 """Fig. 2 of the paper on the screen: static and dynamic friction by contact, with intervals and series."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,24 @@ from PySide6.QtWidgets import QWidget
 from analysis.arrays import Floats
 from analysis.quantities import Quantity
 from app.presenters.campaign.state import ContactBars
+from app.presenters.curve_table import TableCurve
+from app.presenters.number_text import format_fixed
 from app.qt.theme import Theme, colour
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import PlotStack
-from messages.i18n import gettext
+from messages.i18n import N_, gettext
 
 _WIDTH, _SPREAD = 0.36, 0.22
 _HEADROOM = 1.08
 _TICKS_HEIGHT, _ROOM = 44, 220
 """Of two lines below the axis, and for the name of a contact, in pixels."""
+
+
+_COLUMNS: tuple[tuple[str, Callable[[Quantity], float]], ...] = (
+    ("{symbol}", lambda mean: mean.value),
+    (N_("{symbol}, lower end of 95 %"), lambda mean: mean.interval_95[0]),
+    (N_("{symbol}, upper end of 95 %"), lambda mean: mean.interval_95[1]),
+)
 
 
 class FrictionPlot(QWidget):
@@ -34,7 +44,8 @@ class FrictionPlot(QWidget):
         self.setToolTip(
             gettext("Bars: mean over the series with its 95 % interval; points: series; ▲ at least")
         )
-        self._stack = PlotStack(theme, ((title, "text"),), interactive=False)
+        self._stack = PlotStack(theme, ((title, "text"),), format_point=_format_point)
+        self._stack.table = self._table
         self._stack.plots[0].bottom.setHeight(_TICKS_HEIGHT)
         self._stack.resized.connect(lambda _: self._name_contacts())
         make_column(self._stack, of=self)
@@ -44,13 +55,33 @@ class FrictionPlot(QWidget):
     def show_contacts(self, contacts: tuple[ContactBars, ...]) -> None:
         self._contacts = contacts
         texts = "; ".join(map(_accessible_text, contacts)) or gettext("nothing yet")
-        self.setAccessibleName(gettext("Friction by contact: {said}", said=texts))
+        self._stack.setAccessibleName(gettext("Friction by contact: {said}", said=texts))
         self._draw()
+
+    def _table(self) -> list[TableCurve]:
+        """Means of both frictions by contact, with the ends of their intervals."""
+        if not self._contacts:
+            return []
+        names = np.array([bars.contact for bars in self._contacts])
+        kinds = (
+            ("f_s", [bars.static for bars in self._contacts]),
+            ("f_d", [bars.dynamic for bars in self._contacts]),
+        )
+        return [
+            TableCurve(
+                gettext("contact"),
+                gettext(title, symbol=symbol),
+                names,
+                np.array([read(mean) if mean else math.nan for mean in means]),
+            )
+            for symbol, means in kinds
+            for title, read in _COLUMNS
+        ]
 
     def _draw(self) -> None:
         (plot,) = self._stack.plots
         for item in self._items:
-            plot.view.removeItem(item)
+            plot.remove(item)
         self._items = []
         self._stack.restyle()
         self._stack.set_time_title("")
@@ -114,3 +145,7 @@ def _tick_text(bars: ContactBars, *, has_room: bool) -> str:
 def _accessible_text(bars: ContactBars) -> str:
     values = [f"{name} {bar.value:.3f}" for name, bar in (("f_s", bars.static), ("f_d", bars.dynamic)) if bar]
     return f"{bars.contact} {' '.join(values)}"
+
+
+def _format_point(_x: float, friction: float) -> str:
+    return format_fixed(friction, 4)

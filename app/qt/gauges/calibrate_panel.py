@@ -16,7 +16,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from analysis.formatting import typeset
+from analysis.formatting import typeset, with_unit
 from app.presenters import number_text
 from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.state import (
@@ -29,7 +29,9 @@ from app.presenters.gauges.state import (
 from app.qt.theme import TextRole, Theme, colour
 from app.qt.widgets.inputs import CheckBox, make_button, make_choice, make_fields, show_texts
 from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row, make_scroll_area
-from app.qt.widgets.plots import PlotStack, pen
+from app.qt.widgets.plot_curves import Points
+from app.qt.widgets.plot_marks import pen
+from app.qt.widgets.plots import PlotStack
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, show_chip
 from messages.i18n import N_, gettext
@@ -206,10 +208,12 @@ class ResidualPlot(PlotStack):
     """Marks pointing up on the way up, down on the way down, about a line at zero."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, ((gettext(_TITLE), "text"),), interactive=False)
+        super().__init__(theme, ((gettext(_TITLE), "text"),), format_point=_format_point)
         (plot,) = self.plots
         self._zero = plot.add(pg.InfiniteLine(pos=0.0, angle=0, movable=False))
-        self._marks = [plot.add(pg.ScatterPlotItem(symbol=mark, size=10)) for mark in ("t1", "t")]
+        self._marks = [plot.add(Points(symbol=mark, size=10)) for mark in ("t1", "t")]
+        for marks, title in zip(self._marks, (N_("residual upwards"), N_("residual downwards")), strict=True):
+            marks.title, marks.unit = gettext(title), "µm"
         self.setFixedHeight(_HEIGHT)
         self.setAccessibleName(gettext("Residuals of the calibration"))
         theme.changed.connect(self._recolour)
@@ -240,3 +244,8 @@ class ResidualPlot(PlotStack):
         for marks, token in zip(self._marks, (tokens.channel_1, tokens.channel_2), strict=True):
             marks.setBrush(pg.mkBrush(colour(token)))
             marks.setPen(pg.mkPen(None))
+
+
+def _format_point(dial_mm: float, residual_um: float) -> str:
+    dial, residual = number_text.format_fixed(dial_mm, 3), number_text.format_fixed(residual_um, 1)
+    return f"{with_unit(dial, 'mm')}   {with_unit(residual, 'µm')}"

@@ -6,14 +6,17 @@ from collections.abc import Callable
 import numpy as np
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
+from analysis.formatting import typeset, with_unit
 from analysis.gauge_health import HealthGrade
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
+from app.presenters.curve_table import TableCurve
 from app.presenters.gauge_health import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
 from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
-from app.qt.widgets.plots import PlotStack, pen
+from app.qt.widgets.plot_marks import pen
+from app.qt.widgets.plots import PlotStack
 from app.qt.widgets.text import ValueGrid, label, show_chip
 from messages.i18n import N_, gettext
 
@@ -21,6 +24,8 @@ _SYMPTOMS_SHOWN = 3
 _TITLE = N_("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
 _FREQUENCY = N_("frequency, Hz")
 _DASHES = (6.0, 3.0)
+_SHORT, _EVEN = 0.7, 4
+"""Decades that hold two marks at least, and number of even marks."""
 _VERDICTS = {HealthGrade.GOOD: N_("Good"), HealthGrade.DOUBTFUL: N_("Doubtful"), HealthGrade.BAD: N_("Bad")}
 
 
@@ -88,20 +93,25 @@ def _chip(grade: HealthGrade, words: str) -> Chip:
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Marks at 1, 2, 5 and their powers of ten, on an axis of logarithms."""
+    """Marks at 1, 2, 5 and their powers of ten, on an axis of logarithms; even ones on a short part of it."""
     decades = range(math.floor(low), math.ceil(high) + 1)
     values = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
-    return [(math.log10(value), f"{value:g}") for value in values if low <= math.log10(value) <= high]
+    if high - low < _SHORT:
+        values = np.linspace(10.0**low, 10.0**high, _EVEN + 2)[1:-1].tolist()
+    return [(math.log10(value), f"{value:.4g}") for value in values if low <= math.log10(value) <= high]
 
 
 class Spectrum(PlotStack):
     """Amplitude density of both gauges over the frequency, both axes logarithmic."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, ((gettext(_TITLE), "text"),), interactive=False)
+        super().__init__(theme, ((gettext(_TITLE), "text"),), format_point=_format_point)
         (plot,) = self.plots
         self._curves = [plot.curve() for _ in range(2)]
+        self.table = self._table
+        plot.view.sigRangeChanged.connect(lambda *_: self._mark_axes())
         self.setMinimumHeight(180)
+        self.setAccessibleName(gettext("Noise of both gauges over the frequency"))
         theme.changed.connect(self._recolour)
         self._recolour()
 
@@ -110,14 +120,27 @@ class Spectrum(PlotStack):
         drawn = [(np.log10(frequency), np.log10(np.maximum(density, 1e-6))) for frequency, density in lines]
         for curve, (x, y) in zip(self._curves, drawn, strict=True):
             curve.setData(x, y)
+        for number, curve in enumerate(self._curves, start=1):
+            curve.title, curve.unit = gettext("gauge {number}, noise", number=number), "µm/√Hz"
         (plot,) = self.plots
         low = min(float(y.min()) for _, y in drawn) - 0.1
         high = max(float(y.max()) for _, y in drawn) + 0.1
         first, last = float(drawn[0][0][0]), float(drawn[0][0][-1])
         plot.set_value_range(low, high)
-        plot.left.setTicks([_ticks(low, high)])
-        plot.bottom.setTicks([_ticks(first, last)])
         self.set_time_range(first, last)
+        self._mark_axes()
+
+    def _mark_axes(self) -> None:
+        (plot,) = self.plots
+        for axis, span in zip((plot.bottom, plot.left), plot.view.viewRange(), strict=True):
+            axis.setTicks([_ticks(*span)])
+
+    def _table(self) -> list[TableCurve]:
+        """Frequencies and densities themselves, not their logarithms."""
+        return [
+            TableCurve(curve.x_title, curve.title, 10.0**curve.x, 10.0**curve.y)
+            for curve in self.curves_in_view()
+        ]
 
     def _recolour(self) -> None:
         self.restyle()
@@ -125,3 +148,9 @@ class Spectrum(PlotStack):
         tokens = self._theme.tokens
         self._curves[0].setPen(pen(tokens.channel_1))
         self._curves[1].setPen(pen(tokens.channel_2, dashes=_DASHES))
+
+
+def _format_point(log_frequency: float, log_density: float) -> str:
+    """Frequency and density at a point of the axes of logarithms."""
+    frequency, density = (typeset(f"{10.0**value:.3g}") for value in (log_frequency, log_density))
+    return f"{with_unit(frequency, 'Hz')}   {with_unit(density, 'µm/√Hz')}"

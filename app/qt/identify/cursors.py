@@ -12,7 +12,8 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QWidget
 from app.presenters.identify.state import Cursor, Cursors
 from app.qt.theme import TextRole, Tokens
 from app.qt.widgets.layouts import make_column, make_row
-from app.qt.widgets.plots import Plot, pen, shade
+from app.qt.widgets.plot_marks import pen, shade
+from app.qt.widgets.plots import Plot
 from app.qt.widgets.text import label, padded, set_text_or_hide
 from messages.i18n import gettext
 

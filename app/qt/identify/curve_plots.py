@@ -1,26 +1,18 @@
 """Record against simulation for both gauges, and what is left over: three plots, one time axis."""
 
-from typing import Any
-
+import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Signal
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QGraphicsItem, QWidget
+from PySide6.QtWidgets import QWidget
 
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, ManualFit, PlotLine, ReadingUnit
 from app.qt.identify.cursors import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column
-from app.qt.widgets.plots import (
-    Plot,
-    PlotStack,
-    ShadedSpans,
-    pen,
-    place_region,
-    shade,
-    shaded_region,
-    value_at,
-)
+from app.qt.widgets.plot_curves import Curve
+from app.qt.widgets.plot_marks import ShadedSpans, pen, place_region, shade, shaded_region
+from app.qt.widgets.plots import PlotStack, value_at
 from app.qt.widgets.text import padded
 from messages.i18n import N_, gettext
 
@@ -35,11 +27,14 @@ _RECORD_ONLY = N_("— record; no motion was fitted")
 _OF_RESIDUAL = N_("table and relative; between the dashes: twice the noise")
 _OF_TABLE = N_("table; between the dashes: twice the noise")
 _NO_RESIDUAL = N_("nothing was fitted that could leave any")
+_CHANNELS = (N_("table displacement"), N_("relative displacement"))
+_RECORD, _SIMULATION = N_("{channel}, record"), N_("{channel}, simulation")
+_RESIDUAL = N_("{channel}, residual")
 _BEFORE_RELEASE_S = 1.0
 
 
 class CurvePlots(QWidget):
-    """Draws `Curves`. The wheel zooms in time, dragging moves.
+    """Draws `Curves`.
 
     A simulation by hand has items of its own: those of the fit are hidden meanwhile, and what does not
     change comes from pictures that Qt keeps, so that a frame costs two short lines a plot.
@@ -51,15 +46,13 @@ class CurvePlots(QWidget):
         super().__init__()
         self._theme = theme
         self._curves: Curves | None = None
-        self._stack = PlotStack(
-            theme, [("", colour) for colour in _COLOURS], interactive=True, heights=(3, 3, 2)
-        )
+        self._stack = PlotStack(theme, [("", colour) for colour in _COLOURS], heights=(3, 3, 2))
         table, relative, residual = self._stack.plots
-        self._records = [_curve(table), _curve(relative)]
-        self._simulations = [_curve(plot, "subsample") for plot in (table, relative)]
-        self._residuals = [_curve(residual, per_pixel=1.0) for _ in range(2)]
-        self._hand_simulations = [_quick_curve(plot) for plot in (table, relative)]
-        self._hand_residuals = [_quick_curve(residual) for _ in range(2)]
+        self._records = [plot.line() for plot in (table, relative)]
+        self._simulations = [plot.line(is_smooth=True) for plot in (table, relative)]
+        self._residuals = [residual.line() for _ in range(2)]
+        self._hand_simulations = [plot.add(_QuickCurve()) for plot in (table, relative)]
+        self._hand_residuals = [residual.add(_QuickCurve()) for _ in range(2)]
         self._slips = [ShadedSpans(plot) for plot in self._stack.plots]
         self._noise = shaded_region(residual, "horizontal")
         self._noise.setZValue(10)
@@ -72,21 +65,25 @@ class CurvePlots(QWidget):
         self._restyle()
 
     def show_curves(self, curves: Curves) -> None:
+        """Show a run. Under another law of the same run the part in view stays."""
+        keep = self._curves is not None and np.array_equal(self._curves.time_s, curves.time_s)
         self._curves = curves
         self._stack.set_time_title(curves.time_label)
         for row, channel in enumerate(padded(curves.channels, 2, None)):
-            _set(self._records[row], curves.time_s, channel.record if channel else None)
-            _set(self._simulations[row], curves.time_s, channel.simulation if channel else None)
-            _set(self._residuals[row], curves.time_s, channel.residual if channel else None)
+            self._records[row].show_line(curves.time_s, channel.record if channel else None)
+            self._simulations[row].show_line(curves.time_s, channel.simulation if channel else None)
+            self._residuals[row].show_line(curves.time_s, channel.residual if channel else None)
         self.show_manual_fit(None)
         for plot, lines in zip(self._stack.plots, _lines(curves), strict=True):
-            plot.fit_values(*lines)
+            plot.fit_values(*lines, keep=keep)
         self._set_titles(curves)
+        self._name_curves(curves)
         for slip in self._slips:
             slip.show_spans(curves.slips)
         band = 2.0 * (curves.noise or 0.0)
         place_region(self._noise, (-band, band) if band else None)
-        self._stack.set_time_range(max(float(curves.time_s[0]), -_BEFORE_RELEASE_S), float(curves.time_s[-1]))
+        first_s, last_s = float(curves.time_s[0]), float(curves.time_s[-1])
+        self._stack.set_time_range(max(first_s, -_BEFORE_RELEASE_S), last_s, (first_s, last_s), keep=keep)
 
     def show_manual_fit(self, hand: ManualFit | None) -> None:
         for fitted in (*self._simulations, *self._residuals):
@@ -117,6 +114,18 @@ class CurvePlots(QWidget):
         for row, (name, unit, text) in enumerate(zip(_NAMES, _units(curves), texts, strict=True)):
             self._stack.set_title(row, f"{gettext(name, unit=unit.symbol)} &nbsp; {text}")
             self._stack.set_plot_visible(row, shown=shown[row])
+
+    def _name_curves(self, curves: Curves) -> None:
+        for row, name in enumerate(_CHANNELS):
+            named = (
+                (self._records[row], _RECORD, curves.unit),
+                (self._simulations[row], _SIMULATION, curves.unit),
+                (self._hand_simulations[row], _SIMULATION, curves.unit),
+                (self._residuals[row], _RESIDUAL, curves.residual_unit),
+                (self._hand_residuals[row], _RESIDUAL, curves.residual_unit),
+            )
+            for curve, of_channel, unit in named:
+                curve.title, curve.unit = gettext(of_channel, channel=gettext(name)), unit.symbol
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
@@ -161,32 +170,15 @@ def _lines(curves: Curves) -> tuple[list[Floats], ...]:
     return tuple([line for line in lines if line is not None] for lines in rows)
 
 
-def _curve(plot: Plot, method: str = "peak", per_pixel: float = 5.0) -> Any:
-    """A line drawn with a few points a pixel, whatever the span; `peak` keeps every extreme.
-
-    Its picture is kept until it changes.
-    """
-    curve = plot.curve(autoDownsampleFactor=per_pixel)
-    curve.setDownsampling(auto=True, method=method)
-    curve.setClipToView(True)
-    curve.curve.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
-    return curve
-
-
-def _quick_curve(plot: Plot) -> Any:
+class _QuickCurve(Curve):
     """A line that comes as finely as it is drawn and changes with each frame: no smooth edges."""
-    curve = pg.PlotCurveItem(antialias=False, skipFiniteCheck=True)
-    return plot.add(curve)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.setData(np.empty(0), np.empty(0), antialias=False, skipFiniteCheck=True)
 
 
-def _set(curve: Any, time_s: Floats, values: Floats | None) -> None:
-    if values is None:
-        curve.setData([], [])
-    else:
-        curve.setData(time_s, values, connect="finite")
-
-
-def _set_line(curve: Any, line: PlotLine | None) -> None:
+def _set_line(curve: Curve, line: PlotLine | None) -> None:
     curve.setVisible(line is not None)
     if line is not None:
         curve.setData(line.time_s, line.values, connect="finite")

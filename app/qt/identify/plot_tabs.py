@@ -2,18 +2,23 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
+from analysis.formatting import with_unit
 from app.presenters.identify.state import Cursor, Cursors, Motion, PlotTab, PlottedQuantity
+from app.presenters.number_text import format_fixed
 from app.qt.identify.cursors import CursorLines, CursorPoints
 from app.qt.identify.curve_plots import CurvePlots
 from app.qt.identify.slip_plots import SlipPages
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column, make_row
-from app.qt.widgets.plots import PlotStack, ShadedSpans, pen, shade, value_at, value_extent
+from app.qt.widgets.plot_marks import ShadedSpans, pen, shade
+from app.qt.widgets.plots import PlotStack, value_at, value_extent
 from app.qt.widgets.shortcuts import describe_shortcut
+from app.qt.widgets.text import plain_text
 from messages.i18n import N_, gettext
 
 _NAMES = {
@@ -68,8 +73,6 @@ class PlotTabs(QStackedWidget):
             self.addWidget(page)
             if isinstance(page, CurvePlots | TimePlots | SlipPages):
                 page.cursors.moved.connect(self.cursor_moved)
-        self.setProperty("role", "plots")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         describe_shortcut(
             self, "← → A B", gettext("Move a cursor by a reading, with Shift by ten; choose the cursor")
         )
@@ -82,9 +85,13 @@ class PlotTabs(QStackedWidget):
         page = self._page(tab)
         page.cursors.show_cursors(cursors)
         self.setCurrentWidget(page)
-        self.setAccessibleName(page.accessibleName())
         cells = () if cursors is None else (*map(" ".join, cursors.cells), cursors.period)
-        self.setAccessibleDescription("; ".join(cells))
+        stacks = page.findChildren(PlotStack)
+        for stack in stacks:
+            stack.setAccessibleName(page.accessibleName())
+            stack.setAccessibleDescription("; ".join(cells))
+            stack.reserved_keys = frozenset() if cursors is None else frozenset(_DIRECTIONS)
+        self.setFocusProxy(stacks[0])
 
     def span(self) -> tuple[float, float] | None:
         """Visible times (s); None on the phase plane."""
@@ -113,25 +120,27 @@ class TimePlots(QWidget):
         self._theme = theme
         self._lines: Sequence[PlottedQuantity] = ()
         heads = [(title, tokens[0] if len(tokens) == 1 else "text") for title, tokens in plots]
-        self._stack = PlotStack(theme, heads, interactive=True, heights=(3, 2))
+        self._stack = PlotStack(theme, heads, heights=(3, 2))
         self._slips = [ShadedSpans(plot) for plot in self._stack.plots]
         self._colours = [token for _, tokens in plots for token in tokens]
         self._rows = [row for row, (_, tokens) in enumerate(plots) for _ in tokens]
-        self._curves = [self._stack.plots[row].curve() for row in self._rows]
+        self._curves = [self._stack.plots[row].line() for row in self._rows]
         self.cursors = CursorLines(self._stack.plots)
         self._stack.hovered.connect(self._show_values)
         make_column(self._stack, of=self)
         theme.changed.connect(self._restyle)
 
     def show_lines(self, lines: Sequence[PlottedQuantity], slips: tuple[tuple[float, float], ...]) -> None:
+        keep = bool(self._lines) and np.array_equal(self._lines[0].time_s, lines[0].time_s)
         self._lines = lines
         for curve, line in zip(self._curves, lines, strict=True):
-            curve.setData(line.time_s, line.values)
+            curve.title, curve.unit = plain_text(line.symbol), line.unit
+            curve.show_line(line.time_s, line.values)
         for row, plot in enumerate(self._stack.plots):
-            plot.fit_values(*(line.values for line in self._lines_of(row)))
+            plot.fit_values(*(line.values for line in self._lines_of(row)), keep=keep)
         for slip in self._slips:
             slip.show_spans(slips)
-        self._stack.set_time_range(float(lines[0].time_s[0]), float(lines[0].time_s[-1]))
+        self._stack.set_time_range(float(lines[0].time_s[0]), float(lines[0].time_s[-1]), keep=keep)
         self._restyle()
 
     def span(self) -> tuple[float, float]:
@@ -169,7 +178,7 @@ class PhasePlots(QWidget):
             (gettext("table: velocity, mm/s"), "channel_1"),
             (gettext("plate against table: velocity, mm/s"), "channel_2"),
         )
-        self._stacks = [PlotStack(theme, (title,), interactive=False) for title in titles]
+        self._stacks = [PlotStack(theme, (title,), format_point=_format_phase) for title in titles]
         self._curves = [stack.plots[0].curve() for stack in self._stacks]
         self.cursors = CursorPoints([stack.plots[0] for stack in self._stacks])
         make_row(*((stack, 1) for stack in self._stacks), of=self)
@@ -179,6 +188,7 @@ class PhasePlots(QWidget):
     def show_lines(self, lines: Sequence[PlottedQuantity], _slips: object) -> None:
         pairs = zip(lines[::2], lines[1::2], strict=True)
         for stack, curve, (displacement, velocity) in zip(self._stacks, self._curves, pairs, strict=True):
+            curve.title, curve.unit = plain_text(velocity.symbol), velocity.unit
             curve.setData(displacement.values, velocity.values)
             stack.set_time_range(*value_extent(displacement.values))
             stack.plots[0].fit_values(velocity.values)
@@ -191,3 +201,8 @@ class PhasePlots(QWidget):
             stack.set_time_title(axis)
         for curve, token in zip(self._curves, (tokens.channel_1, tokens.channel_2), strict=True):
             curve.setPen(pen(token))
+
+
+def _format_phase(displacement_mm: float, velocity_mm_per_s: float) -> str:
+    places = (displacement_mm, 3, "mm"), (velocity_mm_per_s, 2, "mm/s")
+    return "   ".join(with_unit(format_fixed(value, decimals), unit) for value, decimals, unit in places)

@@ -7,12 +7,15 @@ from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QFrame, QSizePolicy
 
+from analysis.formatting import with_unit
 from app.presenters.analysed_run import Objective
 from app.presenters.identify.state import ManualFit
+from app.presenters.number_text import format_fixed
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import make_column, make_row
-from app.qt.widgets.plots import PlotStack, draggable_line, pen, shade, shaded_region, vertical_line
+from app.qt.widgets.plot_marks import draggable_line, pen, shade, shaded_region, vertical_line
+from app.qt.widgets.plots import PlotStack
 from app.qt.widgets.shortcuts import describe_shortcut
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext
@@ -39,11 +42,17 @@ class ScanPlot(QFrame):
         self._poll = poll
         self._scan: Objective | None = None
         self._stack = PlotStack(
-            theme, ((gettext("residual, µm, against f<sub>d</sub>"), "text"),), interactive=False
+            theme,
+            ((gettext("residual, µm, against f<sub>d</sub>"), "text"),),
+            format_point=_format_point,
         )
+        self._stack.reserved_keys = frozenset(_KEYS) | {Qt.Key.Key_Home}
+        self._stack.setAccessibleName(gettext("Residual against the friction coefficient, with a handle"))
+        self.setFocusProxy(self._stack)
         (plot,) = self._stack.plots
         self._interval = shaded_region(plot)
         self._curve = plot.curve()
+        self._curve.title, self._curve.unit = gettext("residual"), "µm"
         self._fitted = vertical_line(plot)
         self._handle = draggable_line(plot)
         self._words = label(gettext(_WORDS), TextRole.LABEL, muted=True, wrap=True)
@@ -55,9 +64,6 @@ class ScanPlot(QFrame):
         )
         self._back.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self.setProperty("role", "plots")
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleName(gettext("Residual against the friction coefficient, with a handle"))
         describe_shortcut(
             self, "← →", gettext("Try another f_d by hand, with Shift in larger steps; Home goes back")
         )
@@ -131,3 +137,7 @@ class ScanPlot(QFrame):
         below = make_row((self._words, 1), self._back)
         below.setContentsMargins(16, 0, 16, 4)
         make_column(self._stack, below, spacing=4, of=self)
+
+
+def _format_point(friction: float, residual_um: float) -> str:
+    return f"f<sub>d</sub> {format_fixed(friction, 5)}   {with_unit(format_fixed(residual_um, 1), 'µm')}"

@@ -5,11 +5,14 @@ from typing import Any
 import pyqtgraph as pg
 from PySide6.QtWidgets import QWidget
 
-from app.presenters.identify.state import SlipPlot, SlipPlots
+from app.presenters.identify.state import Floats, SlipPlot, SlipPlots
+from app.presenters.number_text import format_fixed
 from app.qt.identify.cursors import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column
-from app.qt.widgets.plots import Plot, PlotStack, pen, shade
+from app.qt.widgets.plot_curves import Points
+from app.qt.widgets.plot_marks import pen, shade
+from app.qt.widgets.plots import Plot, PlotStack
 from app.qt.widgets.text import label, set_subscripts
 
 _POINT = 5  # in pixels
@@ -25,7 +28,7 @@ class SlipPages(QWidget):
         self._shown: SlipPlots | None = None
         self._statement = label(wrap=True)
         self._statement.setContentsMargins(16, 4, 16, 0)
-        self._stacks = [PlotStack(theme, (("", "channel_2"),), interactive=False) for _ in range(3)]
+        self._stacks = [PlotStack(theme, (("", "channel_2"),), format_point=_format_point) for _ in range(3)]
         self._items: list[tuple[Plot, Any]] = []
         self.cursors = CursorLines(self._stacks[-1].plots)
         make_column(self._statement, *((stack, 1) for stack in self._stacks), of=self)
@@ -48,7 +51,7 @@ class SlipPages(QWidget):
 
     def _draw(self) -> None:
         for pane, item in self._items:
-            pane.view.removeItem(item)
+            pane.remove(item)
         self._items = []
         self.cursors.restyle(self._theme.tokens)
         for stack in self._stacks:
@@ -68,11 +71,20 @@ class SlipPages(QWidget):
         x = plot.scale * trend.at
         return [
             pg.FillBetweenItem(*edges, brush=shade(tokens.simulation, _BAND)),
-            pg.PlotDataItem(plot.scale * at, line, pen=pen(tokens.simulation, dashes=(5.0, 5.0))),
+            pg.PlotCurveItem(plot.scale * at, line, pen=pen(tokens.simulation, dashes=(5.0, 5.0))),
             pg.ErrorBarItem(
                 x=x, y=trend.friction, height=2.0 * trend.half_width_95, beam=0.0, pen=pen(tokens.channel_2)
             ),
-            pg.ScatterPlotItem(
-                x=x, y=trend.friction, size=_POINT, pen=None, brush=pg.mkBrush(tokens.channel_2)
-            ),
+            self._points(x, trend.friction),
         ]
+
+    def _points(self, x: Floats, friction: Floats) -> Points:
+        points = Points(
+            x=x, y=friction, size=_POINT, pen=None, brush=pg.mkBrush(self._theme.tokens.channel_2)
+        )
+        points.title = "f_d"
+        return points
+
+
+def _format_point(x: float, friction: float) -> str:
+    return f"{format_fixed(x, 3)}   f<sub>d</sub> {format_fixed(friction, 4)}"

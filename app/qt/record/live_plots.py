@@ -3,43 +3,50 @@
 import math
 from typing import Any
 
-import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
-from app.presenters.decimated_history import Polyline
 from app.presenters.record.state import Span, TraceMarks, Traces
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column
-from app.qt.widgets.plots import Plot, PlotStack, pen, place_region, shade, shaded_region, value_at
+from app.qt.widgets.plot_marks import pen, place_region, shade, shaded_region
+from app.qt.widgets.plot_view import X
+from app.qt.widgets.plots import Plot, PlotStack, value_at
 from messages.i18n import N_, gettext
 
 TITLES = (
     (N_("table displacement u<sub>1</sub>, mm"), "channel_1"),
     (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "channel_2"),
 )
-
-_DENSE_STROKES = 100.0
-"""A line that crosses the plot this often is drawn as a filled band: ten times faster, and looks alike."""
+_NAMES = (N_("table displacement"), N_("relative displacement"))
 
 
 class LivePlots(QWidget):
+    """Draws `Traces`. A part that the user has zoomed into stays until the time axis begins anew."""
+
     resized = Signal(int)
+    zoomed = Signal(
+        object
+    )  # part of the time axis in view (s), None for all of it; comes while a state is shown
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
         titles = [(gettext(text), token) for text, token in TITLES]
-        self._stack = PlotStack(theme, titles, interactive=False)
+        self._stack = PlotStack(theme, titles)
         self._stack.resized.connect(self.resized)
         self._stack.hovered.connect(self._hover)
         self._traces = Traces()
+        self._zoom_s: Span | None = None
         self._pointed_s = math.nan
         self._curves = [plot.curve() for plot in self._stack.plots]
+        for curve, name in zip(self._curves, _NAMES, strict=True):
+            curve.title, curve.unit = gettext(name), "mm"
+        self._stack.plots[0].view.sigXRangeChanged.connect(lambda *_: self._report_zoom())
         self._marks = [_PlotMarks(plot, is_first=row == 0) for row, plot in enumerate(self._stack.plots)]
         make_column(self._stack, of=self)
-        self.setAccessibleName(gettext("Live traces of table displacement and relative displacement"))
+        self._stack.setAccessibleName(gettext("Live traces of table displacement and relative displacement"))
         theme.changed.connect(self._restyle)
         self._restyle()
 
@@ -47,22 +54,35 @@ class LivePlots(QWidget):
         if traces is self._traces:
             return
         old, self._traces = self._traces, traces
-        if traces.span != old.span:
-            self._stack.set_time_range(*traces.span)
+        begins_anew = traces.time_title != old.time_title
+        if traces.span != old.span or begins_anew:
+            self._stack.set_time_range(*traces.span, keep=not begins_anew)
         if _limits(traces) != _limits(old):
             self._set_limits()
-        if traces.time_title != old.time_title:
+        if begins_anew:
             self._stack.set_time_title(gettext(traces.time_title))
-        _draw(self._curves[0], traces.table, traces.table_limit_mm)
-        _draw(self._curves[1], traces.relative, traces.relative_limit_mm)
+        self._draw()
         if traces.marks != old.marks:
             self._draw_marks(traces.marks)
         if not math.isnan(self._pointed_s):
             self._read_out()
 
+    def _draw(self) -> None:
+        lines = (self._traces.table, self._traces.relative)
+        for plot, curve, line in zip(self._stack.plots, self._curves, lines, strict=True):
+            _, (low, high) = plot.view.viewRange()
+            curve.show_polyline(line, high - low)
+
+    def _report_zoom(self) -> None:
+        is_whole = self._stack.plots[0].view.is_home(X)
+        zoom_s = None if is_whole else self._stack.time_range()
+        if zoom_s != self._zoom_s:
+            self._zoom_s = zoom_s
+            self.zoomed.emit(zoom_s)
+
     def _set_limits(self) -> None:
         for plot, limit_mm in zip(self._stack.plots, _limits(self._traces), strict=True):
-            plot.set_value_range(-limit_mm, limit_mm)
+            plot.set_value_range(-limit_mm, limit_mm, keep=True)
 
     def _draw_marks(self, marks: TraceMarks) -> None:
         for items in self._marks:
@@ -75,7 +95,7 @@ class LivePlots(QWidget):
             curve.setPen(pen(token))
         for items in self._marks:
             items.restyle(self._theme)
-        self._stack.set_time_range(*self._traces.span)
+        self._stack.set_time_range(*self._traces.span, keep=True)
         self._set_limits()
         self._stack.set_time_title(gettext(self._traces.time_title))
         self._draw_marks(self._traces.marks)
@@ -126,31 +146,6 @@ class _PlotMarks:
         _place_line(self._release, marks.release_s)
         _place_lines(self._range, ends_mm)
         _place_lines(self._edges, band_mm)
-
-
-def _draw(curve: Any, line: Polyline, limit_mm: float) -> None:
-    is_dense = line.strokes(2.0 * limit_mm) > _DENSE_STROKES
-    if is_dense and line.is_min_max and not line.has_gaps:
-        _draw_band(curve, line)
-        return
-    connect = "finite" if line.has_gaps else "all"
-    curve.setData(
-        line.time_s, line.value, connect=connect, skipFiniteCheck=True, fillLevel=None, antialias=not is_dense
-    )
-
-
-def _draw_band(curve: Any, line: Polyline) -> None:
-    """Fill between the lowest and the highest value of each span."""
-    low, high = line.value[::2], line.value[1::2]
-    curve.setData(
-        np.concatenate((line.time_s[::2], line.time_s[::-2])),
-        np.concatenate((low, high[::-1])),
-        connect="all",
-        skipFiniteCheck=True,
-        fillLevel="enclosed",
-        fillBrush=curve.opts["pen"].color(),
-        antialias=False,
-    )
 
 
 def _line(plot: Plot, *, angle: int, text: str, position: float) -> Any:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QFrame, QLabel, QLineEdit, QSizePoli
 
 from app.presenters.base import EMPTY_CHIP, Chip
 from app.presenters.record.presenter import RecordPresenter
-from app.presenters.record.state import Action, PlotResized, RecordState, StatusBar
+from app.presenters.record.state import Action, PlotResized, PlotZoomed, RecordState, StatusBar
 from app.presenters.results import Result
 from app.qt.record.live_plots import LivePlots
 from app.qt.record.panels import DecisionPanel, GuidancePanel, ResultPanel
@@ -41,6 +41,8 @@ class RecordScreen(QWidget):
         self._status_bar = StatusBarWidget()
         self._plots = LivePlots(theme)
         self._plots.resized.connect(lambda width_px: presenter.dispatch(PlotResized(width_px)))
+        later = Qt.ConnectionType.QueuedConnection  # a state that is being shown may change the view
+        self._plots.zoomed.connect(lambda span: presenter.dispatch(PlotZoomed(span)), later)
         self._guidance = GuidancePanel(theme, connect_device)
         self._result = ResultPanel()
         self._decision = DecisionPanel(presenter.dispatch, self._take_focus)

@@ -9,7 +9,8 @@ from PySide6.QtWidgets import QWidget
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.theme import TextRole, Theme, colour
 from app.qt.widgets.layouts import make_column
-from app.qt.widgets.plots import PlotStack, pen, value_at
+from app.qt.widgets.plot_marks import pen
+from app.qt.widgets.plots import PlotStack, value_at
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext
 
@@ -17,6 +18,7 @@ _TITLES = (
     N_("table displacement u<sub>1</sub>, {unit}"),
     N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, {unit}"),
 )
+_CHANNELS = (N_("table displacement"), N_("relative displacement"))
 _MOST = 8
 _MOST_VALUES = 3
 """More values do not fit beside a title."""
@@ -31,16 +33,17 @@ class RunsPreview(QWidget):
         super().__init__()
         self._theme = theme
         self._overlay = Overlay()
-        self._stack = PlotStack(theme, [("", "text") for _ in _TITLES], interactive=True)
+        self._stack = PlotStack(theme, [("", "text") for _ in _TITLES])
         self._stack.hovered.connect(self._show_values)
-        self._curves = [[plot.curve() for _ in range(_MOST)] for plot in self._stack.plots]
+        self._stack.pictured = self  # with the names
+        self._curves = [[plot.line() for _ in range(_MOST)] for plot in self._stack.plots]
         self._names = label(role=TextRole.LABEL, wrap=True)
         self._words = label(muted=True, wrap=True)
         self._words.setAlignment(Qt.AlignmentFlag.AlignTop)
         make_column((self._stack, 1), self._names, self._words, spacing=4, of=self)
         self._names.setContentsMargins(12, 0, 12, 4)
         self._words.setContentsMargins(12, 8, 12, 8)
-        self.setAccessibleName(gettext("Preview of the selected runs"))
+        self._stack.setAccessibleName(gettext("Preview of the selected runs"))
         theme.changed.connect(self._restyle)
         self._restyle()
         self.show_overlay(None)
@@ -62,11 +65,10 @@ class RunsPreview(QWidget):
         traces = self._overlay.traces
         for number, curves in enumerate(zip(*self._curves, strict=True)):
             trace = traces[number] if number < len(traces) else None
-            for curve, line in zip(curves, _lines(trace), strict=True):
-                if trace is None or line is None:
-                    curve.setData([], [])
-                else:
-                    curve.setData(trace.time_s, line, connect="finite")
+            for channel, (curve, line) in enumerate(zip(curves, _lines(trace), strict=True)):
+                curve.title = "" if trace is None else ", ".join((trace.name, gettext(_CHANNELS[channel])))
+                curve.unit = self._overlay.unit
+                curve.show_line(None if trace is None else trace.time_s, line)
         if traces:
             self._set_extent(traces)
         self._restyle()

@@ -1,27 +1,39 @@
-"""Plots below one another with one time axis."""
+"""Plots below one another with one time axis, with the gestures, keys and menu that all plots have."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QPointF, QRectF, Qt, Signal
-from PySide6.QtGui import QBrush, QPainter, QPixmapCache, QResizeEvent
-from PySide6.QtWidgets import QGraphicsItem, QWidget
+from PySide6.QtCore import QEvent, QPointF, QRect, Qt, Signal
+from PySide6.QtGui import (
+    QContextMenuEvent,
+    QEnterEvent,
+    QFocusEvent,
+    QKeyEvent,
+    QPixmapCache,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import QFrame, QGraphicsItem, QWidget
 
 from analysis.formatting import typeset, with_unit
+from app.presenters.curve_table import TableCurve
 from app.presenters.number_text import format_fixed
-from app.qt.theme import TextRole, Theme, Tokens, colour, font
+from app.qt.theme import TextRole, Theme, Tokens, font
 from app.qt.widgets.layouts import make_column
+from app.qt.widgets.plot_curves import Curve, Line, Points
+from app.qt.widgets.plot_marks import Crosshair
+from app.qt.widgets.plot_tools import PlotTools
+from app.qt.widgets.plot_view import PlotView, X, Y
+from app.qt.widgets.text import plain_text
 
 Floats = NDArray[np.float64]
 AXIS_WIDTH = 52
 _SMALLEST_HEIGHT = 96
 _ENDLESS = 16_777_215.0
 """Qt's own largest height."""
-_BEHIND = -10
 _GRID_ALPHA = 51
 """20 % of 255."""
 _CACHE_KB = 128 * 1024
@@ -34,10 +46,9 @@ class Plot:
     It is built of pyqtgraph's view and axes: a `PlotItem` would create seven menus for each plot.
     """
 
-    def __init__(self, canvas: Any, row: int, *, interactive: bool) -> None:
-        self.view = pg.ViewBox(enableMenu=False)
-        self.view.setMouseEnabled(x=interactive, y=False)
-        self.view.disableAutoRange()
+    def __init__(self, canvas: Any, row: int) -> None:
+        self.view = PlotView()
+        self._items: list[Curve | Points] = []
         self.left = self._axis("left")
         self.bottom = self._axis("bottom")
         self.left.setWidth(AXIS_WIDTH)
@@ -47,21 +58,58 @@ class Plot:
         canvas.addItem(self.view, row=3 * row + 1, col=1, colspan=2)
         canvas.addItem(self.bottom, row=3 * row + 2, col=1, colspan=2)
 
-    def curve(self, **options: Any) -> Any:
-        return self.add(pg.PlotDataItem(antialias=True, **options))
+    def curve(self) -> Curve:
+        """Add a curve of few points, or of such as come decimated."""
+        curve = Curve()
+        self.add(curve)
+        return curve
+
+    def line(self, *, is_smooth: bool = False) -> Line:
+        """Add a line over rising times that may be long."""
+        line = Line(is_smooth=is_smooth)
+        self.add(line)
+        return line
 
     def add(self, item: Any) -> Any:
         self.view.addItem(item, ignoreBounds=True)
+        if isinstance(item, Curve | Points):
+            self._items.append(item)
+        if isinstance(item, Line):
+            self.view.sigRangeChanged.connect(item.refresh)
+            self.view.sigResized.connect(item.refresh)
         return item
 
-    def set_value_range(self, low: float, high: float) -> None:
-        self.view.setYRange(low, high, padding=0.0)
+    def remove(self, item: Any) -> None:
+        self.view.removeItem(item)
+        if item in self._items:
+            self._items.remove(item)
 
-    def fit_values(self, *lines: Floats) -> None:
+    def set_value_range(self, low: float, high: float, *, keep: bool = False) -> None:
+        """Set the range of values that a reset shows; none beyond it can be shown."""
+        self.view.set_home(Y, (low, high), keep=keep)
+
+    def fit_values(self, *lines: Floats, keep: bool = False) -> None:
         """Show all values of lines, with a margin."""
-        self.set_value_range(*value_extent(*lines))
+        self.set_value_range(*value_extent(*lines), keep=keep)
+
+    def autoscale(self) -> None:
+        """Fit the height to what is in view."""
+        values = [curve.y for curve in self.curves_in_view("")]
+        if any(len(part) for part in values):
+            self.view.show_ranges({Y: value_extent(*values)})
+
+    def curves_in_view(self, x_title: str) -> list[TableCurve]:
+        """Points in view of the curves that are shown, with their titles."""
+        span = self.view.viewRange()[X]
+        shown = [(item, *item.samples()) for item in self._items if item.isVisible()]
+        return [
+            TableCurve(x_title, ", ".join(filter(None, (item.title, item.unit))), x, y).between(*span)
+            for item, x, y in shown
+            if len(x)
+        ]
 
     def restyle(self, tokens: Tokens) -> None:
+        self.view.restyle(tokens)
         for axis in (self.left, self.bottom):
             axis.setPen(pg.mkPen(tokens.line, width=1))
             axis.setTickPen(pg.mkPen(tokens.muted, width=1))
@@ -77,10 +125,11 @@ class Plot:
         return axis
 
 
-class PlotStack(QWidget):
+class PlotStack(QFrame):
     """Several plots, linked in time, each with a title at its top left and a readout at its top right.
 
-    `titles` are rich text and colour token of each plot, from the top. `heights` are relative.
+    `titles` are rich text and colour token of each plot, from the top. `heights` are relative. `format_point`
+    writes x and y of the pointer, where no view reads the curves there itself.
     """
 
     hovered = Signal(float)  # time under the pointer (s); NaN when it has left
@@ -91,25 +140,42 @@ class PlotStack(QWidget):
         theme: Theme,
         titles: Sequence[tuple[str, str]],
         *,
-        interactive: bool,
         heights: Sequence[int] = (),
+        format_point: Callable[[float, float], str] | None = None,
     ) -> None:
         super().__init__()
         QPixmapCache.setCacheLimit(_CACHE_KB)
         self._theme = theme
         self._titles = list(titles)
+        self._format_point = format_point
+        self.pointer: tuple[int, QPointF] | None = None
+        """Row of the plot under the pointer, and the place there in its units."""
+        self.reserved_keys: frozenset[Qt.Key] = frozenset()
+        """Keys that the widget around handles."""
+        self.export_name = "plot"
+        self.pictured: QWidget = self
+        """What is copied and saved as a picture."""
+        self.table: Callable[[], list[TableCurve]] = self.curves_in_view
+        """What is saved as a table."""
         self._canvas = pg.GraphicsLayoutWidget()
         for part in (self._canvas, self._canvas.viewport()):
-            part.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are for the whole plot, if for anything
-        self.plots = [Plot(self._canvas, row, interactive=interactive) for row in range(len(titles))]
+            part.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are for the whole plot
+        self.plots = [Plot(self._canvas, row) for row in range(len(titles))]
+        self._crosshair = Crosshair(self.plots)
+        self._tools = PlotTools(self)
         self._arrange(heights or [1] * len(titles))
         make_column(self._canvas, of=self)
         self._canvas.scene().sigMouseMoved.connect(self._on_mouse)
+        self._canvas.scene().sigMouseClicked.connect(self._on_click)
+        self.setProperty("role", "plots")
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMinimumHeight(_SMALLEST_HEIGHT * len(titles))
 
     def restyle(self) -> None:
         tokens = self._theme.tokens
         self._canvas.setBackground(tokens.surface)
+        self._crosshair.restyle(tokens)
+        self._tools.restyle(tokens)
         for plot, (text, token) in zip(self.plots, self._titles, strict=True):
             _write(plot.title, text, getattr(tokens, token))
             plot.restyle(tokens)
@@ -129,12 +195,30 @@ class PlotStack(QWidget):
     def set_time_title(self, text: str) -> None:
         self.plots[-1].bottom.setLabel(text, **{"color": self._theme.tokens.muted, "font-size": "11px"})
 
-    def set_time_range(self, start_s: float, end_s: float) -> None:
-        self.plots[0].view.setXRange(start_s, end_s, padding=0.0)
+    def set_time_range(
+        self, start_s: float, end_s: float, limits: tuple[float, float] | None = None, *, keep: bool = False
+    ) -> None:
+        """Set the times that a reset shows, and show them; `limits` are the ends of the record, if others.
+
+        With `keep` a part that the user has zoomed into stays.
+        """
+        for plot in self.plots:
+            plot.view.set_home(X, (start_s, end_s), limits, keep=keep)
 
     def time_range(self) -> tuple[float, float]:
         (start_s, end_s), _ = self.plots[0].view.viewRange()
         return float(start_s), float(end_s)
+
+    def reset_view(self) -> None:
+        for plot in self.plots:
+            plot.view.show_home(Y)
+            plot.view.show_home(X)
+
+    def autoscale(self) -> None:
+        """Fit the height of each plot to what is in view."""
+        for plot in self.plots:
+            if plot.view.isVisible():
+                plot.autoscale()
 
     def set_readout(self, row: int, text: str) -> None:
         _write(self.plots[row].readout, text, self._theme.tokens.text)
@@ -147,9 +231,54 @@ class PlotStack(QWidget):
         at = "" if math.isnan(at_s) else with_unit(format_fixed(at_s, 3), "s")
         self.set_readout(row, f"{at}   {with_unit(' | '.join(texts), unit)}" if at and texts else at)
 
+    def curves_in_view(self) -> list[TableCurve]:
+        x_title = plain_text(self.plots[-1].bottom.labelText)
+        return [curve for plot in self.plots for curve in plot.curves_in_view(x_title)]
+
+    def views_meant(self, axis: int) -> list[PlotView]:
+        """Views that a key means: of the plot under the pointer, else of all; time is common to them."""
+        rows = [self.pointer[0]] if self.pointer else range(1 if axis == X else len(self.plots))
+        return [self.plots[row].view for row in rows]
+
+    def first_plot_rect(self) -> QRect:
+        """Place of the first plot in pixels of the stack."""
+        inside: QRect = self._canvas.mapFromScene(self.plots[0].view.sceneBoundingRect()).boundingRect()
+        return inside.translated(self._canvas.pos())
+
+    @property
+    def tokens(self) -> Tokens:
+        return self._theme.tokens
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        if Qt.Key(event.key()) in self.reserved_keys or not self._tools.press(event):
+            event.ignore()
+
+    def contextMenuEvent(self, event: QContextMenuEvent) -> None:  # noqa: N802
+        if event.reason() is QContextMenuEvent.Reason.Keyboard:  # of a click pyqtgraph wants to see the end
+            self._tools.open_menu(self.mapToGlobal(self.rect().center()))
+        event.accept()
+
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
+        self._tools.place_bar()
         self.resized.emit(max(64, self.width() - AXIS_WIDTH - 20))
+
+    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: N802
+        super().enterEvent(event)
+        self._tools.show_bar()
+
+    def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
+        super().focusInEvent(event)
+        self._tools.show_bar()
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
+        super().leaveEvent(event)
+        self.forget_pointer()
+        self._tools.hide_bar()
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802
+        super().focusOutEvent(event)
+        self._tools.hide_bar()
 
     def _arrange(self, heights: Sequence[int]) -> None:
         grid = self._canvas.ci.layout
@@ -165,25 +294,41 @@ class PlotStack(QWidget):
             plot.view.setXLink(self.plots[0].view)
 
     def _on_mouse(self, position: QPointF) -> None:
-        for plot in self.plots:
-            if plot.view.sceneBoundingRect().contains(position):
-                self.hovered.emit(float(plot.view.mapSceneToView(position).x()))
+        for row, plot in enumerate(self.plots):
+            if plot.view.isVisible() and plot.view.sceneBoundingRect().contains(position):
+                self._point(row, plot.view.mapSceneToView(position))
                 return
+        self.forget_pointer()
+
+    def _point(self, row: int, at: QPointF) -> None:
+        if self.pointer is not None and self.pointer[0] != row:
+            self.forget_pointer()
+        self.pointer = row, at
+        self._crosshair.show_at(row, at)
+        if self._format_point is not None:
+            self.set_readout(row, self._format_point(at.x(), at.y()))
+        self.hovered.emit(float(at.x()))
+
+    def forget_pointer(self) -> None:
+        if self.pointer is None:
+            return
+        row, _ = self.pointer
+        self.pointer = None
+        self._crosshair.hide()
+        if self._format_point is not None:
+            self.set_readout(row, "")
         self.hovered.emit(math.nan)
+
+    def _on_click(self, event: Any) -> None:
+        if event.button() == Qt.MouseButton.RightButton:
+            self._tools.open_menu(event.screenPos().toPoint())
+        elif event.button() == Qt.MouseButton.LeftButton and event.double():
+            self.reset_view()
 
 
 class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:  # noqa: N802
         return [typeset(text) for text in super().tickStrings(values, scale, spacing)]
-
-
-def pen(token_colour: str, *, alpha: float = 1.0, dashes: Sequence[float] = ()) -> Any:
-    """Pen of one pixel: two pixels take five times as long to draw."""
-    return pg.mkPen(colour(token_colour, alpha), width=1, dash=list(dashes) or None)
-
-
-def shade(token_colour: str, alpha: float) -> Any:
-    return pg.mkBrush(colour(token_colour, alpha))
 
 
 def value_at(time_s: Floats, values: Floats, at_s: float) -> float:
@@ -202,69 +347,7 @@ def value_extent(*lines: Floats) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def shaded_region(plot: Plot, orientation: str = "vertical") -> Any:
-    """Add a hidden shaded span behind the curves of a plot; `place_region` shows it."""
-    item = pg.LinearRegionItem(orientation=orientation, movable=False, pen=pg.mkPen(None))
-    item.setZValue(_BEHIND)
-    item.hide()
-    return plot.add(item)
-
-
-def vertical_line(plot: Plot) -> Any:
-    return plot.add(pg.InfiniteLine(angle=90, movable=False))
-
-
-def draggable_line(plot: Plot) -> Any:
-    """Add a vertical line with a grip that the mouse can drag."""
-    line = pg.InfiniteLine(angle=90, movable=True)
-    line.addMarker("o", position=0.5, size=14.0)
-    line.setZValue(20)
-    return plot.add(line)
-
-
-def place_region(item: Any, span: tuple[float, float] | None) -> None:
-    item.setVisible(span is not None)
-    if span is not None:
-        item.setRegion(span)
-
-
 def _write(item: Any, text: str, text_colour: str) -> None:
     """Set the text of a label; a wide one is cut instead of moving the plot."""
     item.setText(f'<span style="color: {text_colour}; font-size: 12px">{text}</span>')
     item.setMinimumWidth(0.0)
-
-
-class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
-    def __init__(self, plot: Plot) -> None:
-        super().__init__()
-        self._spans: tuple[tuple[float, float], ...] = ()
-        self._brush = QBrush()
-        self.setZValue(_BEHIND)
-        self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)  # they seldom change
-        plot.add(self)
-
-    @property
-    def spans(self) -> tuple[tuple[float, float], ...]:
-        return self._spans
-
-    def show_spans(self, spans: tuple[tuple[float, float], ...]) -> None:
-        self._spans = spans
-        self.update()
-
-    def set_brush(self, brush: Any) -> None:
-        self._brush = brush
-        self.update()
-
-    def viewTransformChanged(self) -> None:  # noqa: N802
-        super().viewTransformChanged()
-        self.prepareGeometryChange()
-
-    def boundingRect(self) -> QRectF:  # noqa: N802
-        return QRectF(self.viewRect())
-
-    def paint(self, painter: QPainter, *_: Any) -> None:
-        seen = self.viewRect()
-        for start, end in self._spans:
-            left, right = max(start, seen.left()), min(end, seen.right())
-            if left < right:
-                painter.fillRect(QRectF(left, seen.top(), right - left, seen.height()), self._brush)

@@ -60,14 +60,16 @@ def describe_shortcut(widget: QWidget, key: str, words: str) -> None:
 
 
 def list_shortcuts(widget: QWidget, *, own: bool = False) -> list[ShortcutHelp]:
-    """Shortcuts of a widget and its parts, or only its own, in the order in which they were added."""
+    """Shortcuts of a widget and its parts, or only its own, in the order in which they were added.
+
+    Those that several parts have, such as plots, are listed once.
+    """
     depth = Qt.FindChildOption.FindDirectChildrenOnly if own else Qt.FindChildOption.FindChildrenRecursively
     shortcuts = [key for key in widget.findChildren(QShortcut, "", depth) if key.whatsThis()]
     parts = [widget] if own else [widget, *widget.findChildren(QWidget)]
     described = [part.property(_DESCRIBED) for part in parts]
-    return [ShortcutHelp(_native(key.key().toString()), key.whatsThis()) for key in shortcuts] + [
-        ShortcutHelp(*words) for words in described if words
-    ]
+    found = [ShortcutHelp(_native(key.key().toString()), key.whatsThis()) for key in shortcuts]
+    return list(dict.fromkeys([*found, *(ShortcutHelp(*words) for words in described if words)]))
 
 
 def _native(keys: str) -> str:

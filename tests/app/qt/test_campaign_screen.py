@@ -98,7 +98,7 @@ def test_a_campaign_is_drawn(stage: Stage) -> None:
     assert "3 runs" in table.item(0, 0).toolTip()
     for expected in ("Campaign: 9 runs in 3 series", "1SSM1", "Contact", "found", "torn.h5: It is no run."):
         assert expected in stage.words()
-    assert "FF" in stage.screen._plot.accessibleName()
+    assert "FF" in stage.screen._plot._stack.accessibleName()
 
 
 def test_effects_of_the_stand_have_a_block(stage: Stage) -> None:

@@ -15,8 +15,6 @@ from test_main_window import Desk
 from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.screens import Screen
-from app.qt.identify.plot_tabs import PlotTabs
-from app.qt.identify.scan_plot import ScanPlot
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack
 
@@ -132,7 +130,7 @@ def test_plots_that_take_keys_show_the_focus(desk: Desk, theme: Theme) -> None:
     desk.worker.calls[-1].done(with_scan())
     desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
     desk.window.activateWindow()
-    for plots in (*desk.window.findChildren(PlotTabs), *desk.window.findChildren(ScanPlot)):
+    for plots in filter(QWidget.isVisible, desk.window.findChildren(PlotStack)):
         desk.button("Cursors").setFocus()
         edge = QPoint(plots.width() // 2, 0)
         assert plots.grab().toImage().pixelColor(edge) != QColor(theme.tokens.accent)

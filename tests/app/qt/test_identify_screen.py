@@ -117,7 +117,7 @@ def test_a_run_is_drawn_with_all_that_was_found(stage: Stage) -> None:
         assert expected in words
     curves = stage.presenter.state.curves
     assert curves is not None
-    time_s, residual_um = stage.curves._residuals[1].getOriginalDataset()
+    time_s, residual_um = stage.curves._residuals[1].samples()
     np.testing.assert_array_equal(time_s, curves.time_s)
     assert np.nanstd(residual_um) == pytest.approx(20.0, rel=0.05)
     assert stage.curves._slips[0].spans == (pytest.approx((0.0, 2.5)),)
@@ -160,7 +160,7 @@ def test_a_run_without_fit_second_gauge_or_release_is_drawn_too(stage: Stage) ->
     stage.presenter.on_analysed(analysed())
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(bare)
-    assert stage.curves._records[1].getOriginalDataset()[0] is None
+    assert len(stage.curves._records[1].samples()[0]) == 0
     assert not stage.curves._noise.isVisible()
     assert [plot.view.isVisible() for plot in stage.curves._stack.plots] == [True, False, False]
     assert "this run has no second gauge" in stage.curves._stack.plots[1].title.text
@@ -452,7 +452,7 @@ def test_cursors_stand_at_the_same_times_on_every_tab_and_are_read_in_its_units(
     cursors = stage.presenter.state.cursors
     assert cursors is not None
     assert cursors.a_s == pytest.approx(2.999)
-    assert cursors.cells[0][1] in stage.screen._plots.accessibleDescription()
+    assert cursors.cells[0][1] in stage.screen._plots.focusProxy().accessibleDescription()
     stage.screen._tabs.setCurrentIndex(0)
     assert stage.curves.cursors._lines[Cursor.A][0].value() == pytest.approx(2.999)
     assert clipped_words(stage.screen) == []
@@ -477,7 +477,7 @@ def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot
 
 def test_the_keys_of_the_cursors_are_told_once_for_all_tabs(stage: Stage) -> None:
     told = [key.key for key in list_shortcuts(stage.screen)]
-    assert sorted(told) == sorted(["C", "← → A B", "← →"])
+    assert sorted(told) == sorted(["C", "← → A B", "← →", "+ − ← → ↑ ↓ Y Home"])
     assert stage.screen._cursors.toolTip().endswith("(C)")
 
 

@@ -7,7 +7,7 @@ from pytestqt.qtbot import QtBot
 
 from app.presenters.decimated_history import DecimatedHistory
 from app.presenters.record.state import Traces
-from app.qt.record import live_plots
+from app.qt.widgets import plot_curves
 from app.qt.record.live_plots import LivePlots
 from app.qt.theme import Theme
 
@@ -38,7 +38,7 @@ def test_many_swings_a_pixel_are_drawn_as_the_band_they_look_like(
     theme: Theme, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     band = drawn(theme, qtbot)
-    monkeypatch.setattr(live_plots, "_DENSE_STROKES", np.inf)
+    monkeypatch.setattr(plot_curves, "_DENSE_STROKES", np.inf)
     strokes = drawn(theme, qtbot)
     assert band.sum() > 10_000
     # Strokes are softened at their ends, bands are not: one pixel at either edge.

@@ -213,7 +213,7 @@ def test_without_a_device_the_way_to_one_is_offered(stage: Stage, qtbot: QtBot) 
 def test_the_curves_are_the_traces(stage: Stage) -> None:
     tail(stage)
     traces = stage.presenter.state.traces
-    drawn = [curve.getOriginalDataset() for curve in stage.screen._plots._curves]
+    drawn = [curve.samples() for curve in stage.screen._plots._curves]
     for (time_s, value), line in zip(drawn, (traces.table, traces.relative), strict=True):
         np.testing.assert_array_equal(time_s, line.time_s)
         np.testing.assert_array_equal(value, line.value)

@@ -1,0 +1,61 @@
+"""A finished line for drawing: any part of it at a few points a pixel, however long it is."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.presenters.decimated_history import Polyline
+
+Floats = NDArray[np.float64]
+
+_GROUP = 16
+"""Rows, and spans of each level, that make a span of the next level."""
+
+
+class DecimatedLine:
+    """Line over times that do not fall; NaN breaks it.
+
+    A part that has more rows than fit is drawn by the lowest and highest value of spans of rows, or, if the
+    line `is_smooth`, by every n-th row. Spans begin at the same rows wherever the part begins: a drawing that
+    is moved does not flicker.
+    """
+
+    def __init__(self, time_s: Floats, values: Floats, *, is_smooth: bool = False) -> None:
+        self.time_s = time_s
+        self.values = values
+        self._is_smooth = is_smooth
+        self._levels = [(values, values)]  # lowest and highest values of spans of `_GROUP` ** index rows
+
+    def part(self, start_s: float, end_s: float, pixels: int) -> Polyline:
+        """Rows from `start_s` to `end_s` and one beyond each end, for a drawing `pixels` wide."""
+        first = max(int(np.searchsorted(self.time_s, start_s)) - 1, 0)
+        end = min(int(np.searchsorted(self.time_s, end_s, side="right")) + 1, len(self.time_s))
+        per_span = _power_of_two((end - first) // max(pixels, 1))
+        if per_span <= 2:  # two extremes are as many points as two rows
+            return Polyline(self.time_s[first:end], self.values[first:end])
+        first -= first % per_span
+        time_s = self.time_s[first:end:per_span]
+        if self._is_smooth:
+            return Polyline(time_s, self.values[first:end:per_span])
+        low, high = self._extremes(first, end, per_span)
+        return Polyline(np.repeat(time_s, 2), np.column_stack((low, high)).ravel())
+
+    def _extremes(self, first: int, end: int, per_span: int) -> tuple[Floats, Floats]:
+        """Lowest and highest values of spans of rows; the last may reach beyond `end`."""
+        depth, size = 0, 1
+        while size * _GROUP <= per_span:
+            depth, size = depth + 1, size * _GROUP
+        low, high = (values[first // size : -(-end // size)] for values in self._level(depth))
+        starts = np.arange(0, len(low), per_span // size)
+        return np.fmin.reduceat(low, starts), np.fmax.reduceat(high, starts)
+
+    def _level(self, depth: int) -> tuple[Floats, Floats]:
+        while len(self._levels) <= depth:
+            low, high = self._levels[-1]
+            starts = np.arange(0, len(low), _GROUP)
+            self._levels.append((np.fmin.reduceat(low, starts), np.fmax.reduceat(high, starts)))
+        return self._levels[depth]
+
+
+def _power_of_two(number: int) -> int:
+    """Largest power of two that is not larger; 1 for 0."""
+    return 1 << max(number.bit_length() - 1, 0)

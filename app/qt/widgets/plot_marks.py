@@ -1,0 +1,118 @@
+"""Marks of plots that are no curves: pens, shaded spans, lines that stand or are dragged, the crosshair."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import pyqtgraph as pg
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QBrush, QPainter
+from PySide6.QtWidgets import QGraphicsItem
+
+from app.qt.theme import Tokens, colour
+
+if TYPE_CHECKING:
+    from app.qt.widgets.plots import Plot
+
+_BEHIND, _ABOVE = -10, 30
+
+
+def pen(token_colour: str, *, alpha: float = 1.0, dashes: Sequence[float] = ()) -> Any:
+    """Pen of one pixel: two pixels take five times as long to draw."""
+    return pg.mkPen(colour(token_colour, alpha), width=1, dash=list(dashes) or None)
+
+
+def shade(token_colour: str, alpha: float) -> Any:
+    return pg.mkBrush(colour(token_colour, alpha))
+
+
+def shaded_region(plot: "Plot", orientation: str = "vertical") -> Any:
+    """Add a hidden shaded span behind the curves of a plot; `place_region` shows it."""
+    item = pg.LinearRegionItem(orientation=orientation, movable=False, pen=pg.mkPen(None))
+    item.setZValue(_BEHIND)
+    item.hide()
+    return plot.add(item)
+
+
+def vertical_line(plot: "Plot") -> Any:
+    return plot.add(pg.InfiniteLine(angle=90, movable=False))
+
+
+def draggable_line(plot: "Plot") -> Any:
+    """Add a vertical line with a grip that the mouse can drag."""
+    line = pg.InfiniteLine(angle=90, movable=True)
+    line.addMarker("o", position=0.5, size=14.0)
+    line.setZValue(20)
+    return plot.add(line)
+
+
+def place_region(item: Any, span: tuple[float, float] | None) -> None:
+    item.setVisible(span is not None)
+    if span is not None:
+        item.setRegion(span)
+
+
+class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
+    def __init__(self, plot: "Plot") -> None:
+        super().__init__()
+        self._spans: tuple[tuple[float, float], ...] = ()
+        self._brush = QBrush()
+        self.setZValue(_BEHIND)
+        self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)  # they seldom change
+        plot.add(self)
+
+    @property
+    def spans(self) -> tuple[tuple[float, float], ...]:
+        return self._spans
+
+    def show_spans(self, spans: tuple[tuple[float, float], ...]) -> None:
+        self._spans = spans
+        self.update()
+
+    def set_brush(self, brush: Any) -> None:
+        self._brush = brush
+        self.update()
+
+    def viewTransformChanged(self) -> None:  # noqa: N802
+        super().viewTransformChanged()
+        self.prepareGeometryChange()
+
+    def boundingRect(self) -> QRectF:  # noqa: N802
+        return QRectF(self.viewRect())
+
+    def paint(self, painter: QPainter, *_: Any) -> None:
+        seen = self.viewRect()
+        for start, end in self._spans:
+            left, right = max(start, seen.left()), min(end, seen.right())
+            if left < right:
+                painter.fillRect(QRectF(left, seen.top(), right - left, seen.height()), self._brush)
+
+
+class Crosshair:
+    """Lines through the pointer: in each plot at its time, and in the plot under it at its height."""
+
+    def __init__(self, plots: "Sequence[Plot]") -> None:
+        self._verticals = [self._line(plot, 90) for plot in plots]
+        self._horizontals = [self._line(plot, 0) for plot in plots]
+
+    def show_at(self, row: int, at: QPointF) -> None:
+        for line in self._verticals:
+            line.setValue(at.x())
+            line.show()
+        for number, line in enumerate(self._horizontals):
+            line.setVisible(number == row)
+            line.setValue(at.y())
+
+    def hide(self) -> None:
+        for line in (*self._verticals, *self._horizontals):
+            line.hide()
+
+    def restyle(self, tokens: Tokens) -> None:
+        for line in (*self._verticals, *self._horizontals):
+            line.setPen(pen(tokens.muted, alpha=0.6))
+
+    def _line(self, plot: "Plot", angle: int) -> Any:
+        line = pg.InfiniteLine(angle=angle, movable=False)
+        line.setAcceptedMouseButtons(Qt.MouseButton.NoButton)
+        line.setZValue(_ABOVE)
+        line.hide()
+        return plot.add(line)
