@@ -224,7 +224,9 @@ class Engine:
         folder = Path(run.directory).absolute()
         demand = self._disk_demand()
         note = check_disk_space(folder, run, demand)
-        metadata = run_setup.build_metadata(run, self._stand, self._gauges, self._stream)
+        metadata = run_setup.build_metadata(
+            run, self._stand, self._gauges, self._stream, simulated=self._port.simulated
+        )
         self._history.span = round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz)
         journal = run_setup.create_run_journal(self._port, run, metadata)
         self._disk.begin(folder, demand)

@@ -18,7 +18,7 @@ from app.acquisition.journal.records import JournalHeader
 from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.stream.live_stream import LiveStream
 from app.runs.journal import SUFFIX
-from app.runs.metadata import RunMetadata, create_metadata
+from app.runs.metadata import RunMetadata, RunSource, create_metadata
 from app.runs.paths import journal_fallback_folders
 from app.version import __version__
 from config.files import load_checks
@@ -71,7 +71,9 @@ def check_run_settings(settings: RunSettings) -> None:
             )
 
 
-def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: LiveStream) -> RunMetadata:
+def build_metadata(
+    settings: RunSettings, stand: Stand, gauges: Gauges, stream: LiveStream, *, simulated: bool = False
+) -> RunMetadata:
     """Metadata of a run when it is armed. Raises ConfigError, MetadataError."""
     return create_metadata(
         stand,
@@ -89,6 +91,7 @@ def build_metadata(settings: RunSettings, stand: Stand, gauges: Gauges, stream: 
         rate_hz=stream.rate_hz,
         host=platform.node(),
         gauge_checks=load_checks().latest_checks(gauges),
+        stated_source=RunSource.SIMULATED if simulated else None,
     )
 
 

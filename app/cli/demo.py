@@ -55,7 +55,9 @@ def _record_test(options: DemoOptions) -> None:
         SimulatedStandOptions, series=series, friction=friction, effects=effects, decay_s=_RECORD_S + 2.0
     )
     with SimulatedStand.start(stand_options) as stand:
-        port = PortSettings(url=stand.port, protocol=stand_options.protocol, rate_hz=stand_options.rate_hz)
+        port = PortSettings(
+            url=stand.port, protocol=stand_options.protocol, rate_hz=stand_options.rate_hz, simulated=True
+        )
         run = RunSettings(
             directory=str(recordings_folder(options.directory)),
             series=series,

@@ -75,7 +75,7 @@ class RunFilter(msgspec.Struct, frozen=True):
     until: datetime.date | None = None
     operator: str | None = None
     text: str | None = None
-    """Occurs in file name, title, note, operator, series or source, whatever the case."""
+    """Occurs in file name, title, note, operator, series or origin, whatever the case; or is the source."""
     stale: bool | None = None
 
     def matches(self, run: RunSummary) -> bool:
@@ -84,7 +84,7 @@ class RunFilter(msgspec.Struct, frozen=True):
             and (self.since is None or _day(run) >= self.since)
             and (self.until is None or _day(run) <= self.until)
             and (self.operator is None or self.operator.casefold() == run.operator.casefold())
-            and (self.text is None or self.text.casefold() in _words(run))
+            and (self.text is None or _holds(run, self.text.casefold()))
             and (self.stale is None or self.stale == run.stale)
         )
 
@@ -203,9 +203,10 @@ def _series(run: RunSummary) -> list[str]:
     return Path(run.path).stem.upper().split("_") if run.fault else [(run.series or "").upper()]
 
 
-def _words(run: RunSummary) -> str:
-    parts = (run.path.rpartition(os.sep)[2], run.title, run.note, run.operator, run.series or "", run.source)
-    return "\n".join(parts).casefold()
+def _holds(run: RunSummary, text: str) -> bool:
+    """Tell whether a text in small letters occurs in a run, or is its source."""
+    parts = (run.path.rpartition(os.sep)[2], run.title, run.note, run.operator, run.series or "", run.origin)
+    return text == run.source or text in "\n".join(parts).casefold()
 
 
 def _day(run: RunSummary) -> datetime.date:

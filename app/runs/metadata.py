@@ -4,6 +4,7 @@ import datetime
 import math
 import re
 from collections.abc import Iterator
+from enum import StrEnum
 from typing import Any, Literal, Self
 
 import msgspec
@@ -12,15 +13,26 @@ from app.runs.errors import ConditionError, MetadataError
 from config.schema import ConfigError, GaugeCheck, Gauges, Stand
 from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, Losses
+from drivers.simulated.identity import is_simulated_device
 from messages.i18n import N_
 from messages.message import Message, message
 
 _FACT_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}")
 
 
+class RunSource(StrEnum):
+    """Where the samples of a run come from."""
+
+    REAL = "real"
+    SIMULATED = "simulated"
+    IMPORTED = "imported"
+
+
 Quantity = Literal["displacement", "velocity", "acceleration"]
 IMPORT_PROTOCOL = "import"
 """Protocol of runs that were imported."""
+SIMULATION_PROTOCOL = "simulate"
+"""Protocol of runs that were computed, without a device."""
 QUANTITY_UNITS: dict[Quantity, str] = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 """SI unit of each quantity that a channel can hold."""
 
@@ -146,6 +158,8 @@ class RunMetadata(_FrozenStruct, frozen=True):
     unit: str = "m"
     source: str = ""
     """Where a run that was not recorded here comes from, for example `imported from run.csv`."""
+    stated_source: RunSource | None = None
+    """`source_type` as stated in the file; None in files of versions that did not state it."""
     source_file: SourceFile = SourceFile()
     truth: dict[str, float | int | str] = {}
     gauge_checks: tuple[GaugeCheck, ...] = ()
@@ -189,6 +203,17 @@ class RunMetadata(_FrozenStruct, frozen=True):
             raise MetadataError("the start of the run is not known")
         return self.start_time
 
+    @property
+    def source_type(self) -> RunSource:
+        """Where the samples come from: as stated, else derived from device, port and truth."""
+        if self.stated_source is not None:
+            return self.stated_source
+        if self.device.protocol == IMPORT_PROTOCOL:
+            return RunSource.IMPORTED
+        computed = self.device.protocol == SIMULATION_PROTOCOL or bool(self.truth)
+        is_simulated = computed or is_simulated_device(self.device, self.port)
+        return RunSource.SIMULATED if is_simulated else RunSource.REAL
+
     def format_start(self, pattern: str) -> str:
         """Start by a pattern of `strftime`; "" where it is not known."""
         return "" if self.start_time is None else self.start_time.strftime(pattern)
@@ -225,7 +250,7 @@ def create_metadata(
         pullback_m = of_series.pullback_m if pullback_m is None else pullback_m
         plate_mass_kg = of_series.plate_mass_kg if plate_mass_kg is None else plate_mass_kg
     code = of_series.code if of_series else None
-    return RunMetadata(
+    metadata = RunMetadata(
         title=title or (f"Pullback test {code}" if code else "Pullback test"),
         start_time=start_time,
         stand=stand,
@@ -236,6 +261,7 @@ def create_metadata(
         plate_mass_kg=stand.plate_mass_kg if plate_mass_kg is None else plate_mass_kg,
         **facts,
     )
+    return metadata.replace(stated_source=metadata.source_type)
 
 
 class Events(_FrozenStruct, frozen=True):

@@ -170,6 +170,7 @@ RUN_FIELDS: Final = (
     _text(f"{USER}/name", "operator", "operator"),
     _text(f"{RUN}/series", "series code", "series", default=None),
     _text(f"{RUN}/source", "origin of a run that was not recorded by this program", "source"),
+    _text(f"{RUN}/source_type", "real, simulated or imported", "stated_source", default=None),
     _text(f"{RUN}/source_file", "name of the file that a run was imported from", "source_file.name"),
     _text(f"{RUN}/source_sha256", "SHA-256 of that file", "source_file.sha256"),
     Field(f"{RUN}/source_size", "size of that file", "source_file.size_bytes", Kind.INTEGER, unit="byte"),

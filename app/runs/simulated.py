@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.blocks import RunBlock, StoredRun
-from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
+from app.runs.metadata import SIMULATION_PROTOCOL, EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
 from config.files import load_stand
 from config.schema import Gauge, Gauges
@@ -62,7 +62,7 @@ def write_simulated_run(
         table_mass_kg=parameters.table_mass_kg,
         plate_mass_kg=parameters.plate_mass_kg,
         title=f"Simulated pullback test {series or ''}".strip(),
-        device=DeviceIdentity(protocol="simulate", name="exact simulation"),
+        device=DeviceIdentity(protocol=SIMULATION_PROTOCOL, name="exact simulation"),
         rate_hz=rate_hz,
         source="simulated",
         truth={name: value for name, value in asdict(parameters).items() if value is not None}

@@ -9,7 +9,7 @@ from analysis.identification import Degree
 from app.runs import schema
 from app.runs.columns import stored_rows
 from app.runs.fields import read_text
-from app.runs.metadata import Conditions
+from app.runs.metadata import Conditions, RunSource
 from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.saved_analyses import metadata_hash, read_analyses
 from messages.message import Message
@@ -33,7 +33,9 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     note: str = ""
     plate_mass_kg: float | None = None
     pullback_m: float | None = None
-    source: str = ""
+    source: RunSource | None = None  # None where it could not be read
+    origin: str = ""
+    """Where a run that was not recorded here comes from, for example `imported from run.csv`."""
     analyses: int = 0
     friction_dynamic: float | None = None
     """Of the newest saved analysis, stale or not."""
@@ -50,7 +52,7 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
 
 
 _OF_METADATA = (
-    "title", "series", "start_time", "operator", "note", "plate_mass_kg", "pullback_m", "source",
+    "title", "series", "start_time", "operator", "note", "plate_mass_kg", "pullback_m",
     "conditions", "excluded",
 )  # fmt: skip
 
@@ -65,6 +67,8 @@ def summarize_file(file: h5py.File) -> RunSummary:
     return RunSummary(
         path=file.filename,
         **{name: getattr(metadata, name) for name in _OF_METADATA},
+        source=metadata.source_type,
+        origin=metadata.source,
         samples=rows,
         duration_s=float(file[schema.TIME][rows - 1]) if rows else 0.0,
         ended=read_text(file, schema.ENDED),

@@ -19,7 +19,7 @@ from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import error_message, map_runs
 from app.runs.blocks import RunBlock, StoredRun, count_flags
 from app.runs.errors import RunError
-from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
+from app.runs.metadata import SIMULATION_PROTOCOL, EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run
 from app.simulated_stand.effects import check_effects, gauge_values, motion_values
 from app.simulated_stand.gauge_chain import GaugeChain
@@ -302,7 +302,9 @@ def test_metadata(test: SyntheticTest) -> RunMetadata:
         title=f"Synthetic pullback test {test.series}",
         operator="demo",
         note="simulated, not recorded from a stand",
-        device=DeviceIdentity("simulate", "synthetic campaign", serial_number=f"seed {test.options.seed}"),
+        device=DeviceIdentity(
+            SIMULATION_PROTOCOL, "synthetic campaign", serial_number=f"seed {test.options.seed}"
+        ),
         rate_hz=test.options.rate_hz,
         source="simulated",
         truth=test.truth,

@@ -5,6 +5,7 @@ import time
 
 from drivers.envelope import Unwrapper
 from drivers.lsl_link import LslOutlet
+from drivers.simulated.identity import STREAM_ID_PREFIX
 from drivers.simulated.transport import Transport
 from drivers.stream_packets import unpack_chunk
 
@@ -19,7 +20,7 @@ class _Outlet(Transport):
     burst_s = 0.05
 
     def __init__(self, rate_hz: float, channels: int) -> None:
-        self._facts = (_NAME, f"slipstand-{os.getpid()}", rate_hz, channels)
+        self._facts = (_NAME, f"{STREAM_ID_PREFIX}{os.getpid()}", rate_hz, channels)
         self._outlet: LslOutlet | None = LslOutlet(*self._facts)
         self._unwrapper = Unwrapper()
         self._origin_s = self._last_s = 0.0

@@ -13,6 +13,7 @@ from abc import ABC, abstractmethod
 from pathlib import Path
 
 from drivers.errors import PortUnavailableError
+from drivers.simulated.identity import PORT_FOLDER_PREFIX
 from messages.i18n import N_
 
 
@@ -244,7 +245,7 @@ def open_pseudo_terminal() -> Transport:
     if not has_pseudo_terminals():
         template = N_("there are no pseudo-terminals on Windows: let the simulated stand use TCP, --tcp 0")
         raise PortUnavailableError(template)
-    folder = Path(tempfile.mkdtemp(prefix="slipstand-stand-"))
+    folder = Path(tempfile.mkdtemp(prefix=PORT_FOLDER_PREFIX))
     try:
         return _PseudoTerminal(_open_device_end(folder / "port"), folder / "port")
     except BaseException:

@@ -9,6 +9,7 @@ from app.presenters import number_text
 from app.presenters.base import Tone
 from app.presenters.results import sentence
 from app.presenters.runs.state import Column, MetadataForm, RunFilter, RunRow, StatusFilter
+from app.runs.metadata import RunSource
 from messages.i18n import N_, gettext
 from messages.message import Message
 
@@ -93,7 +94,7 @@ def make_row(run: "RunSummary") -> RunRow:
         Column.VERDICT: verdict,
         Column.DURATION: number_text.format_fixed(run.duration_s, 1),
         Column.ENDED: gettext(_END_REASONS.get(run.ended, run.ended))
-        or (gettext("imported") if run.source else gettext("not closed")),
+        or (gettext("imported") if run.source is RunSource.IMPORTED else gettext("not closed")),
         Column.OPERATOR: run.operator,
         Column.NOTE: run.note,
     }

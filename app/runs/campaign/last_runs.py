@@ -8,6 +8,7 @@ from pathlib import Path
 from analysis.campaign.series import RunResult
 from app.runs.campaign.run_result import CollectedRun, collect_kept
 from app.runs.listing import find_run_files
+from app.runs.metadata import RunSource
 
 RUNS_MOST = 20  # a few series of a day: enough to tell the stand's effects from those of single runs
 _LONGEST_S = 5.0
@@ -37,7 +38,7 @@ def read_last_runs(folder: Path, stand_name: str) -> LastRuns:
         looked_at += 1
         found.append(collect_kept(path))
     of_stand = [
-        (details.metadata.start_time, result, details.metadata.source == "simulated")
+        (details.metadata.start_time, result, details.metadata.source_type is RunSource.SIMULATED)
         for one in found
         if (details := one.details) and (result := one.result)
         if details.metadata.stand.name == stand_name and not details.metadata.excluded

@@ -9,10 +9,10 @@ from drivers.devices.slipstand_binary import DRIVER, codec
 from drivers.devices.slipstand_binary.codec import FirmwareIdentity, FrameFlags
 from drivers.devices.slipstand_binary.source import BinarySettings
 from drivers.samples import SampleStatus
+from drivers.simulated.identity import FIRMWARE
 from drivers.simulated.protocol import Command, CommandKind, SimulatedProtocol
 from drivers.stream import parse_settings
 
-FIRMWARE = "simulated-1"
 _COMMAND = re.compile(rb"[SPI]|R(\d{1,9})\r?\n")
 _KINDS = {b"S": CommandKind.START, b"P": CommandKind.STOP, b"I": CommandKind.IDENTIFY}
 

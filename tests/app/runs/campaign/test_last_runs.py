@@ -9,7 +9,7 @@ import pytest
 
 from app.runs.campaign import last_runs, run_result
 from app.runs.campaign.last_runs import read_last_runs
-from app.runs.metadata import create_metadata
+from app.runs.metadata import RunSource, create_metadata
 from app.runs.saved_analyses import save_analysis
 from config.files import load_gauges, load_stand
 from tests.app.runs.runs_kit import ANALYSIS, small_run
@@ -46,7 +46,7 @@ def test_kept_results_of_this_stand_are_taken_in_their_order(tmp_path: Path) -> 
 
 
 def test_simulated_runs_do_not_count_beside_recorded_ones(tmp_path: Path) -> None:
-    write(tmp_path, 1, source="simulated")
+    write(tmp_path, 1, stated_source=RunSource.SIMULATED)
     assert names(tmp_path) == ["1"]
 
     write(tmp_path, 2)
