@@ -1,4 +1,4 @@
-"""The window against its figures: repaint, an hour in view, wire to screen, start, memory.
+"""The window against its figures: repaint, an hour in view, zoom and pan, wire to screen, start, memory.
 
 `python benchmarks/desktop.py [--frames 600] [--seconds 20] [--starts 5]` prints the lines of
 docs/benchmarks.md. It draws without a window system unless QT_QPA_PLATFORM says otherwise; under Xvfb:
@@ -20,15 +20,18 @@ import numpy as np
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 import pyqtgraph as pg
-from PySide6.QtCore import QEventLoop
+from PySide6.QtCore import QEvent, QEventLoop, QPoint, QPointF, Qt
+from PySide6.QtGui import QMouseEvent, QWheelEvent
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.ring import RingRows
 from app.presenters.composition import make_window_presenter
+from app.presenters.identify.state import ChannelCurves, Curves, ReadingUnit
 from app.presenters.record.live import LiveTraces
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
+from app.qt.identify.curve_plots import CurvePlots
 from app.qt.record.live_plots import LivePlots
 from app.qt.theme import Theme
 from app.qt.window import MainWindow
@@ -42,6 +45,9 @@ SIZE = (1920, 1080)
 PULLBACK_M = 0.012
 RELEASED_S = 1.0
 PLAIN_FRAMES = 5
+PAN_FRAMES = 100
+BETWEEN_MOVES_S = 0.011
+"""pyqtgraph takes 100 moves of the mouse a second."""
 
 STARTER = """
 import sys, time
@@ -121,6 +127,7 @@ def main() -> None:
         theme, frames = Theme(app), Frames()
         frames.watch()
         hour_in_view(app, theme, frames, chosen.frames)
+        zoom_and_pan(app, theme, frames, chosen.frames)
         plain(app, frames)
         wire_to_screen(app, theme, frames, chosen.seconds)
 
@@ -179,6 +186,103 @@ def hour_in_view(app: QApplication, theme: Theme, frames: Frames, count: int) ->
         f" {grown_kb / 1024:+.1f} MB in the frames"
     )
     plots.close()
+
+
+def zoom_and_pan(app: QApplication, theme: Theme, frames: Frames, count: int) -> None:
+    """An hour at 2 kHz on Record and on Identify: from an event of wheel or mouse to the painted frame."""
+    live, traces = LivePlots(theme), hour_of_traces()
+    live.show_traces(traces.traces)
+    live.zoomed.connect(lambda span: live.show_traces(traces.zoomed(span).traces))
+    fitted = CurvePlots(theme)
+    fitted.show_curves(hour_of_curves())
+    for name, plots in (("Record", live), ("Identify", fitted)):
+        plots.resize(*SIZE)
+        plots.show()
+        app.processEvents()
+        plots._stack.reset_view()
+        (view,) = plots.findChildren(pg.GraphicsView)
+        for what, gesture in (("zoom", zoom), ("pan", pan)):
+            frames.clear()
+            took = []
+            for number in range(count):
+                if gesture is pan and number % PAN_FRAMES == 0:
+                    begin_pan(view.viewport(), number // PAN_FRAMES)
+                time.sleep(BETWEEN_MOVES_S)
+                began = time.perf_counter()
+                gesture(view.viewport(), number)
+                view.viewport().repaint()
+                took.append(time.perf_counter() - began)
+            frames.check(count)
+            tell(f"{what}, hour at {RATE_HZ:g} Hz on {name}, {SIZE[0]} x {SIZE[1]}", took)
+        plots.close()
+
+
+def zoom(viewport: QWidget, number: int) -> None:
+    """Turn the wheel: 40 steps in, to a second of the hour, and 40 out again, at places side by side."""
+    steps = 40
+    is_in = number // steps % 2 == 0
+    at = QPointF(viewport.width() * (0.2 + 0.6 * (number // (2 * steps) % 7) / 6.0), viewport.height() / 4.0)
+    angle = QPoint(0, 120 if is_in else -120)
+    nothing, no_keys = Qt.MouseButton.NoButton, Qt.KeyboardModifier.NoModifier
+    event = QWheelEvent(
+        at, viewport.mapToGlobal(at), QPoint(), angle, nothing, no_keys, Qt.ScrollPhase.NoScrollPhase, False
+    )
+    QApplication.sendEvent(viewport, event)
+
+
+def begin_pan(viewport: QWidget, turn: int) -> None:
+    """Zoom in ten steps further, at each fourth turn all out, and press the middle button."""
+    middle = Qt.MouseButton.MiddleButton
+    if turn:
+        send_mouse(
+            viewport, QEvent.Type.MouseButtonRelease, pan_place(viewport, 0), middle, Qt.MouseButton.NoButton
+        )
+    for step in range(40 if turn % 4 == 3 else 10):
+        zoom(viewport, 40 if turn % 4 == 3 else step)
+    viewport.repaint()
+    send_mouse(viewport, QEvent.Type.MouseButtonPress, pan_place(viewport, 0), middle, middle)
+
+
+def pan(viewport: QWidget, number: int) -> None:
+    """Drag by the middle button, some pixels a frame, to and fro."""
+    at = pan_place(viewport, number % PAN_FRAMES)
+    send_mouse(viewport, QEvent.Type.MouseMove, at, Qt.MouseButton.NoButton, Qt.MouseButton.MiddleButton)
+
+
+def pan_place(viewport: QWidget, frame: int) -> QPointF:
+    return QPointF(viewport.width() / 2.0 + 8.0 * abs(frame - PAN_FRAMES // 2), viewport.height() / 4.0)
+
+
+def send_mouse(
+    viewport: QWidget, kind: QEvent.Type, at: QPointF, button: Qt.MouseButton, buttons: Qt.MouseButton
+) -> None:
+    no_keys = Qt.KeyboardModifier.NoModifier
+    QApplication.sendEvent(
+        viewport, QMouseEvent(kind, at, viewport.mapToGlobal(at), button, buttons, no_keys)
+    )
+
+
+def hour_of_traces() -> LiveTraces:
+    """Live traces of an hour from the release on."""
+    traces = replace(LiveTraces.of_gauges(load_gauges()), width_px=SIZE[0])
+    feed(traces, 0.0, RELEASED_S)
+    traces = traces.on_state(PullbackState.RELEASED, RELEASED_S, StandPosition())
+    for second in np.arange(RELEASED_S, HOUR_S, 0.5):
+        feed(traces, float(second), 0.5)
+    return traces.stopped().cleared(PULLBACK_M)
+
+
+def hour_of_curves() -> Curves:
+    """Record, simulation and residual of both gauges."""
+    time_s = np.arange(-RELEASED_S, HOUR_S, 1.0 / RATE_HZ)
+    noise = np.random.default_rng(1).normal(scale=20.0, size=(2, len(time_s)))
+    swing = 11.0 * np.cos(2.0 * np.pi / 0.32 * time_s)
+    channels = tuple(
+        ChannelCurves(share * swing + 1e-3 * left, share * swing, left)
+        for share, left in zip((1.0, 0.5), noise, strict=True)
+    )
+    unit, residual_unit = ReadingUnit("mm", 3), ReadingUnit("µm", 1)
+    return Curves(time_s, "time from release, s", channels, unit, residual_unit, noise=20.0)
 
 
 def plain(app: QApplication, frames: Frames) -> None:

@@ -14,30 +14,36 @@ _GROUP = 16
 class DecimatedLine:
     """Line over times that do not fall; NaN breaks it.
 
-    A part that has more rows than fit is drawn by the lowest and highest value of spans of rows, or, if the
-    line `is_smooth`, by every n-th row. Spans begin at the same rows wherever the part begins: a drawing that
-    is moved does not flicker.
+    Spans of rows begin at the same rows wherever a part begins: a drawing that is moved does not flicker.
     """
 
-    def __init__(self, time_s: Floats, values: Floats, *, is_smooth: bool = False) -> None:
+    def __init__(self, time_s: Floats, values: Floats) -> None:
         self.time_s = time_s
         self.values = values
-        self._is_smooth = is_smooth
         self._levels = [(values, values)]  # lowest and highest values of spans of `_GROUP` ** index rows
 
     def part(self, start_s: float, end_s: float, pixels: int) -> Polyline:
-        """Rows from `start_s` to `end_s` and one beyond each end, for a drawing `pixels` wide."""
+        """Rows from `start_s` to `end_s` and one beyond each end, for a drawing `pixels` wide.
+
+        More rows than fit come as the lowest and the highest value of spans about as long as a pixel is wide.
+        """
+        first, end, per_span = self._rows(start_s, end_s, pixels)
+        if per_span <= 2:  # two extremes are as many points as two rows
+            return Polyline(self.time_s[first:end], self.values[first:end])
+        low, high = self._extremes(first, end, per_span)
+        return Polyline(np.repeat(self.time_s[first:end:per_span], 2), np.column_stack((low, high)).ravel())
+
+    def thinned(self, start_s: float, end_s: float, pixels: int) -> Polyline:
+        """The same part by every n-th row, of a line that is smooth."""
+        first, end, per_span = self._rows(start_s, end_s, pixels)
+        return Polyline(self.time_s[first:end:per_span], self.values[first:end:per_span])
+
+    def _rows(self, start_s: float, end_s: float, pixels: int) -> tuple[int, int, int]:
+        """First row and end of a part, and rows of a span; the first row begins a span."""
         first = max(int(np.searchsorted(self.time_s, start_s)) - 1, 0)
         end = min(int(np.searchsorted(self.time_s, end_s, side="right")) + 1, len(self.time_s))
         per_span = _power_of_two((end - first) // max(pixels, 1))
-        if per_span <= 2:  # two extremes are as many points as two rows
-            return Polyline(self.time_s[first:end], self.values[first:end])
-        first -= first % per_span
-        time_s = self.time_s[first:end:per_span]
-        if self._is_smooth:
-            return Polyline(time_s, self.values[first:end:per_span])
-        low, high = self._extremes(first, end, per_span)
-        return Polyline(np.repeat(time_s, 2), np.column_stack((low, high)).ravel())
+        return first - first % per_span, end, per_span
 
     def _extremes(self, first: int, end: int, per_span: int) -> tuple[Floats, Floats]:
         """Lowest and highest values of spans of rows; the last may reach beyond `end`."""

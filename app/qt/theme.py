@@ -86,7 +86,7 @@ def font(role: TextRole) -> QFont:
     return made
 
 
-def colour(token: str, alpha: float = 1.0) -> QColor:
+def colour(token: str | QColor, alpha: float = 1.0) -> QColor:
     made = QColor(token)
     made.setAlphaF(alpha)
     return made

@@ -119,7 +119,7 @@ class Spectrum(PlotStack):
         """Draw frequency (Hz) and density (um/sqrt(Hz)) of each gauge."""
         drawn = [(np.log10(frequency), np.log10(np.maximum(density, 1e-6))) for frequency, density in lines]
         for curve, (x, y) in zip(self._curves, drawn, strict=True):
-            curve.setData(x, y)
+            curve.show_points(x, y)
         for number, curve in enumerate(self._curves, start=1):
             curve.title, curve.unit = gettext("gauge {number}, noise", number=number), "µm/√Hz"
         (plot,) = self.plots

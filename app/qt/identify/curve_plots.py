@@ -51,8 +51,9 @@ class CurvePlots(QWidget):
         self._records = [plot.line() for plot in (table, relative)]
         self._simulations = [plot.line(is_smooth=True) for plot in (table, relative)]
         self._residuals = [residual.line() for _ in range(2)]
-        self._hand_simulations = [plot.add(_QuickCurve()) for plot in (table, relative)]
-        self._hand_residuals = [residual.add(_QuickCurve()) for _ in range(2)]
+        # By hand they change with each frame: no smooth edges.
+        self._hand_simulations = [plot.curve(antialias=False) for plot in (table, relative)]
+        self._hand_residuals = [residual.curve(antialias=False) for _ in range(2)]
         self._slips = [ShadedSpans(plot) for plot in self._stack.plots]
         self._noise = shaded_region(residual, "horizontal")
         self._noise.setZValue(10)
@@ -88,6 +89,8 @@ class CurvePlots(QWidget):
     def show_manual_fit(self, hand: ManualFit | None) -> None:
         for fitted in (*self._simulations, *self._residuals):
             fitted.setVisible(hand is None)
+        for record in self._records:
+            record.keep_picture(kept=hand is not None)
         simulated = () if hand is None else hand.simulations_mm
         left_over = () if hand is None else hand.residuals_um
         for curves, lines in ((self._hand_simulations, simulated), (self._hand_residuals, left_over)):
@@ -170,18 +173,10 @@ def _lines(curves: Curves) -> tuple[list[Floats], ...]:
     return tuple([line for line in lines if line is not None] for lines in rows)
 
 
-class _QuickCurve(Curve):
-    """A line that comes as finely as it is drawn and changes with each frame: no smooth edges."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.setData(np.empty(0), np.empty(0), antialias=False, skipFiniteCheck=True)
-
-
 def _set_line(curve: Curve, line: PlotLine | None) -> None:
     curve.setVisible(line is not None)
     if line is not None:
-        curve.setData(line.time_s, line.values, connect="finite")
+        curve.show_points(line.time_s, line.values)
 
 
 def _mixed(token: str, ground: str) -> str:

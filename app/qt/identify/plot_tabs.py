@@ -189,7 +189,7 @@ class PhasePlots(QWidget):
         pairs = zip(lines[::2], lines[1::2], strict=True)
         for stack, curve, (displacement, velocity) in zip(self._stacks, self._curves, pairs, strict=True):
             curve.title, curve.unit = plain_text(velocity.symbol), velocity.unit
-            curve.setData(displacement.values, velocity.values)
+            curve.show_points(displacement.values, velocity.values)
             stack.set_time_range(*value_extent(displacement.values))
             stack.plots[0].fit_values(velocity.values)
 

@@ -83,7 +83,7 @@ class ScanPlot(QFrame):
         if scan is None:
             return
         residual_um = 1e6 * scan.residual_m
-        self._curve.setData(scan.friction, residual_um)
+        self._curve.show_points(scan.friction, residual_um)
         self._interval.setRegion(scan.interval_95)
         self._interval.show()
         self._fitted.setValue(scan.fitted)

@@ -69,9 +69,8 @@ class LivePlots(QWidget):
 
     def _draw(self) -> None:
         lines = (self._traces.table, self._traces.relative)
-        for plot, curve, line in zip(self._stack.plots, self._curves, lines, strict=True):
-            _, (low, high) = plot.view.viewRange()
-            curve.show_polyline(line, high - low)
+        for curve, line in zip(self._curves, lines, strict=True):
+            curve.show_polyline(line)
 
     def _report_zoom(self) -> None:
         is_whole = self._stack.plots[0].view.is_home(X)

@@ -5,15 +5,21 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
+from PySide6.QtGui import QPaintEngine, QPainter
 from PySide6.QtWidgets import QGraphicsItem
 
 from app.presenters.decimated_history import Polyline
 from app.presenters.decimated_line import DecimatedLine
+from app.qt.widgets.plot_band import Band
 
 Floats = NDArray[np.float64]
 
 _DENSE_STROKES = 100.0
-"""A line that crosses the plot this often is drawn as a filled band: ten times faster, and looks alike."""
+"""A line of extremes that crosses the plot this often is drawn as a band: much faster, and looks alike."""
+_SMOOTH_STROKES = 4.0
+"""Length of the edges of a band, in heights of the plot, up to which Qt fills it fastest as a polygon."""
+_EDGE_PX = 8
+"""Width of the spans of the edges of a band: several swings have room in one that cannot be told apart."""
 
 
 class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
@@ -22,8 +28,10 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
     title = ""
     unit = ""
 
-    def __init__(self) -> None:
-        super().__init__(antialias=True)
+    def __init__(self, *, antialias: bool = True) -> None:
+        super().__init__(antialias=antialias)
+        self._polyline = Polyline.empty()
+        self._band: Band | None = None
 
     def setPen(self, *arguments: Any, **options: Any) -> None:  # noqa: N802
         super().setPen(*arguments, **options)
@@ -32,24 +40,47 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def samples(self) -> tuple[Floats, Floats]:
         """All points (n,), which a table of the plot has."""
-        return (np.empty(0), np.empty(0)) if self.xData is None else (self.xData, self.yData)
+        return self._polyline.time_s, self._polyline.value
 
-    def show_polyline(self, line: Polyline, height: float) -> None:
-        """Draw a line in a plot of this height, as a band where strokes could not be told apart."""
-        is_dense = line.strokes(height) > _DENSE_STROKES
-        if is_dense and line.is_min_max and not line.has_gaps:
-            self._show_band(line)
-            return
-        self.setData(
-            line.time_s,
-            line.value,
-            connect="finite" if line.has_gaps else "all",
-            skipFiniteCheck=True,
-            fillLevel=None,
-            antialias=not is_dense,
-        )
+    def show_points(self, x: Floats, y: Floats) -> None:
+        """Draw few points (n,) each, in any order; NaN breaks the line."""
+        self._polyline, self._band = Polyline(x, y), None
+        self.setData(x, y, connect="finite")
 
-    def _show_band(self, line: Polyline) -> None:
+    def keep_picture(self, *, kept: bool) -> None:
+        """Draw from a picture as long as the curve and the view do not change.
+
+        That is faster where only other items change, and slower where the view does.
+        """
+        modes = QGraphicsItem.CacheMode
+        self.setCacheMode(modes.DeviceCoordinateCache if kept else modes.NoCache)
+
+    def show_polyline(self, line: Polyline) -> None:
+        """Draw a line; one of lowest and highest values as a band, where strokes could not be told apart."""
+        self._polyline, self._band = line, None
+        if not self._is_dense(line):
+            self._show_strokes(line, is_dense=False)
+        elif not line.is_min_max:
+            self._show_strokes(line, is_dense=True)
+        elif self._strokes(_edges(line)) < _SMOOTH_STROKES and not line.has_gaps:
+            self._show_polygon(line)
+        else:
+            self._band = Band(line)
+            self._show_strokes(line, is_dense=True)
+
+    def paint(self, painter: QPainter, *arguments: Any) -> None:
+        is_picture = painter.paintEngine().type() == QPaintEngine.Type.Raster
+        if self._band is None or not is_picture:  # a drawing has strokes
+            super().paint(painter, *arguments)
+        else:
+            self._band.paint(painter, self.getViewBox().viewRect(), self.opts["pen"].color())
+
+    def _show_strokes(self, line: Polyline, *, is_dense: bool) -> None:
+        connect = "finite" if line.has_gaps else "all"
+        smooth = {"antialias": not is_dense, "fillLevel": None}
+        self.setData(line.time_s, line.value, connect=connect, skipFiniteCheck=True, **smooth)
+
+    def _show_polygon(self, line: Polyline) -> None:
         """Fill between the lowest and the highest value of each span."""
         low, high = line.value[::2], line.value[1::2]
         self.setData(
@@ -62,11 +93,23 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
             antialias=False,
         )
 
+    def _is_dense(self, line: Polyline) -> bool:
+        return self._strokes(line) > _DENSE_STROKES
+
+    def _strokes(self, line: Polyline) -> float:
+        """Length of a line in heights of the plot."""
+        view = self.getViewBox()
+        if view is None:
+            return 0.0
+        _, (low, high) = view.viewRange()
+        return line.strokes(high - low)
+
 
 class Line(Curve):
     """A curve over rising times: whatever part is in view, as finely as pixels can show it.
 
-    Its picture is kept until it changes.
+    A line that `is_smooth` is drawn through some of its points; where its swings are too many, the edges of
+    its band are drawn, so that a record behind it stays in sight. The picture is kept until it changes.
     """
 
     def __init__(self, *, is_smooth: bool = False) -> None:
@@ -74,16 +117,15 @@ class Line(Curve):
         self._is_smooth = is_smooth
         self._line: DecimatedLine | None = None
         self._drawn: tuple[object, ...] = ()
-        self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
 
     def show_line(self, time_s: Floats | None, values: Floats | None) -> None:
         """Draw values at times, (n,) each; nothing if None."""
         self._drawn = ()
         if time_s is None or values is None or not len(values):
             self._line = None
-            self.setData(np.empty(0), np.empty(0))
+            self.show_polyline(Polyline.empty())
         else:
-            self._line = DecimatedLine(time_s, values, is_smooth=self._is_smooth)
+            self._line = DecimatedLine(time_s, values)
             self.refresh()
 
     def samples(self) -> tuple[Floats, Floats]:
@@ -95,10 +137,26 @@ class Line(Curve):
         if self._line is None or view is None:
             return
         (start_s, end_s), (low, high) = view.viewRange()
-        wanted = (start_s, end_s, high - low, view.width())
-        if wanted != self._drawn:
-            self._drawn = wanted
-            self.show_polyline(self._line.part(start_s, end_s, int(view.width())), high - low)
+        wanted = (start_s, end_s, high - low, view.width(), view.height())
+        if wanted == self._drawn:
+            return
+        self._drawn = wanted
+        part, pixels = (start_s, end_s), int(view.width())
+        if not self._is_smooth:
+            self.show_polyline(self._line.part(*part, pixels))
+            return
+        line = self._line.thinned(*part, pixels)
+        self.show_polyline(
+            _edges(self._line.part(*part, pixels // _EDGE_PX)) if self._is_dense(line) else line
+        )
+
+
+def _edges(line: Polyline) -> Polyline:
+    """Lower and upper edge of a line of lowest and highest values, one after the other."""
+    return Polyline(
+        np.concatenate((line.time_s[::2], line.time_s[:1], line.time_s[::2])),
+        np.concatenate((line.value[::2], [np.nan], line.value[1::2])),
+    )
 
 
 class Points(pg.ScatterPlotItem):  # type: ignore[misc]  # pyqtgraph has no types

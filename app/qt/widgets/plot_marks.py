@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import pyqtgraph as pg
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QBrush, QPainter
-from PySide6.QtWidgets import QGraphicsItem
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import QBrush, QColor, QPainter
 
 from app.qt.theme import Tokens, colour
 
@@ -14,9 +13,11 @@ if TYPE_CHECKING:
     from app.qt.widgets.plots import Plot
 
 _BEHIND, _ABOVE = -10, 30
+_GRID_OPACITIES = (0.2, 0.1)
+"""Of lines at ticks with a number, and between them."""
 
 
-def pen(token_colour: str, *, alpha: float = 1.0, dashes: Sequence[float] = ()) -> Any:
+def pen(token_colour: str | QColor, *, alpha: float = 1.0, dashes: Sequence[float] = ()) -> Any:
     """Pen of one pixel: two pixels take five times as long to draw."""
     return pg.mkPen(colour(token_colour, alpha), width=1, dash=list(dashes) or None)
 
@@ -57,7 +58,6 @@ class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no 
         self._spans: tuple[tuple[float, float], ...] = ()
         self._brush = QBrush()
         self.setZValue(_BEHIND)
-        self.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)  # they seldom change
         plot.add(self)
 
     @property
@@ -85,6 +85,40 @@ class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no 
             left, right = max(start, seen.left()), min(end, seen.right())
             if left < right:
                 painter.fillRect(QRectF(left, seen.top(), right - left, seen.height()), self._brush)
+
+
+class Grid(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
+    """Lines at the ticks of both axes.
+
+    Those of pyqtgraph's axes are pictures as large as the plot, made anew with each step of a zoom.
+    """
+
+    def __init__(self, plot: "Plot") -> None:
+        super().__init__()
+        self._axes = (plot.bottom, plot.left)
+        self._colour = QColor()
+        self.setZValue(2 * _BEHIND)
+        plot.add(self)
+
+    def set_colour(self, ink: str) -> None:
+        self._colour = QColor(ink)
+        self.update()
+
+    def viewTransformChanged(self) -> None:  # noqa: N802
+        super().viewTransformChanged()
+        self.prepareGeometryChange()
+
+    def boundingRect(self) -> QRectF:  # noqa: N802
+        return QRectF(self.viewRect())
+
+    def paint(self, painter: QPainter, *_: Any) -> None:
+        seen = self.viewRect()
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        for level, opacity in enumerate(_GRID_OPACITIES):
+            painter.setPen(pen(self._colour, alpha=opacity))
+            across, along = (axis.ticks_in_view(level) for axis in self._axes)
+            lines = [QLineF(x, seen.top(), x, seen.bottom()) for x in across]
+            painter.drawLines(lines + [QLineF(seen.left(), y, seen.right(), y) for y in along])
 
 
 class Crosshair:

@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPoint, QSize, Qt
-from PySide6.QtGui import QKeyEvent, QKeySequence
+from PySide6.QtGui import QIcon, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QFrame, QMenu, QToolButton, QWidget
 
 from app.qt.theme import Tokens, set_property
@@ -204,7 +204,8 @@ class _Bar(QFrame):
 
     def restyle(self, tokens: Tokens) -> None:
         for name, button in self._buttons.items():
-            button.setIcon(icon(name, tokens.text))
+            drawn = icon(name, tokens.text).pixmap(button.iconSize(), button.devicePixelRatioF())
+            button.setIcon(QIcon(drawn))  # as a picture: it is painted with each frame of the plot below
 
 
 def _button(tool: Tool) -> QToolButton:

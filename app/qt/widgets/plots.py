@@ -24,7 +24,7 @@ from app.presenters.number_text import format_fixed
 from app.qt.theme import TextRole, Theme, Tokens, font
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plot_curves import Curve, Line, Points
-from app.qt.widgets.plot_marks import Crosshair
+from app.qt.widgets.plot_marks import Crosshair, Grid
 from app.qt.widgets.plot_tools import PlotTools
 from app.qt.widgets.plot_view import PlotView, X, Y
 from app.qt.widgets.text import plain_text
@@ -34,8 +34,6 @@ AXIS_WIDTH = 52
 _SMALLEST_HEIGHT = 96
 _ENDLESS = 16_777_215.0
 """Qt's own largest height."""
-_GRID_ALPHA = 51
-"""20 % of 255."""
 _CACHE_KB = 128 * 1024
 """Room for the pictures of axes and grids of a large screen; Qt's own 10 MB hold those of a small one."""
 
@@ -57,10 +55,11 @@ class Plot:
         canvas.addItem(self.left, row=3 * row + 1, col=0)
         canvas.addItem(self.view, row=3 * row + 1, col=1, colspan=2)
         canvas.addItem(self.bottom, row=3 * row + 2, col=1, colspan=2)
+        self._grid = Grid(self)
 
-    def curve(self) -> Curve:
+    def curve(self, *, antialias: bool = True) -> Curve:
         """Add a curve of few points, or of such as come decimated."""
-        curve = Curve()
+        curve = Curve(antialias=antialias)
         self.add(curve)
         return curve
 
@@ -114,13 +113,13 @@ class Plot:
             axis.setPen(pg.mkPen(tokens.line, width=1))
             axis.setTickPen(pg.mkPen(tokens.muted, width=1))
             axis.setTextPen(pg.mkPen(tokens.muted))
+        self._grid.set_colour(tokens.muted)
 
     def _axis(self, side: str) -> Any:
-        axis = _Axis(side, linkView=self.view)
-        axis.setGrid(_GRID_ALPHA)
+        axis = _Axis(side, self.view)
         axis.enableAutoSIPrefix(False)  # "(x0.001)" is no unit
         axis.setStyle(tickFont=font(TextRole.LABEL), tickLength=0, maxTickLevel=1)
-        # Axis and grid seldom change, but would be drawn with each frame: two thirds of its time.
+        # An axis seldom changes, but would be drawn with each frame.
         axis.setCacheMode(QGraphicsItem.CacheMode.DeviceCoordinateCache)
         return axis
 
@@ -327,6 +326,33 @@ class PlotStack(QFrame):
 
 
 class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
+    def __init__(self, side: str, view: PlotView) -> None:
+        super().__init__(side, linkView=view)
+        self._known: tuple[tuple[float, ...], Any] = ((), None)
+
+    def ticks_in_view(self, level: int) -> list[float]:
+        """Ticks of a level: those with a number, then those between them."""
+        if self._tickLevels is not None:
+            return [value for value, _ in self._tickLevels[level]] if level < len(self._tickLevels) else []
+        view = self.linkedView()
+        length = view.height() if self.orientation == "left" else view.width()
+        levels: Any = self.tickValues(self.range[0], self.range[1], length) if length else []
+        return levels[level][1] if level < len(levels) else []
+
+    def generateDrawSpecs(self, painter: Any) -> Any:  # noqa: N802
+        """As pyqtgraph; of an axis without numbers only its line, for its ticks have no length."""
+        if self.style["showValues"]:
+            return super().generateDrawSpecs(painter)
+        bounds = self.mapRectFromParent(self.geometry())
+        return (self.pen(), bounds.topLeft(), bounds.topRight()), [], []
+
+    def tickValues(self, minVal: float, maxVal: float, size: float) -> Any:  # noqa: N802
+        """As pyqtgraph, which asks several times for the same."""
+        asked = (minVal, maxVal, size)
+        if asked != self._known[0]:
+            self._known = asked, super().tickValues(minVal, maxVal, size)
+        return self._known[1]
+
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:  # noqa: N802
         return [typeset(text) for text in super().tickStrings(values, scale, spacing)]
 
