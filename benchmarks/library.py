@@ -97,10 +97,10 @@ def hour(path: Path, rate_hz: float) -> None:
         validator.validate(path)
         rows = {
             "first plot, as the window draws it": lambda: open_decimated(
-                path, SPANS, before_release_s=1.0, validator=validator
+                path, SPANS, between_s=(-1.0, np.inf), validator=validator
             ),
             "the same in a process that has just begun": lambda: open_decimated(
-                path, SPANS, before_release_s=1.0
+                path, SPANS, between_s=(-1.0, np.inf)
             ),
             "all samples": lambda: open_run(path, validator=validator),
             "its four columns by h5py alone": lambda: columns(path),

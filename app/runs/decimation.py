@@ -35,10 +35,17 @@ class DecimatedRun:
 
 
 def open_decimated(
-    path: Path | str, spans: int, *, before_release_s: float = np.inf, validator: Validator | None = None
+    path: Path | str,
+    spans: int,
+    *,
+    between_s: tuple[float, float] = (-np.inf, np.inf),
+    validator: Validator | None = None,
 ) -> DecimatedRun:
-    """Read a run in about so many spans, from `before_release_s` before a known release. Raises RunError."""
-    return validate_and_read(path, lambda file: _overview(file, spans, before_release_s), validator=validator)
+    """Read a run, or a part of it, in about so many spans. Raises RunError.
+
+    `between_s` counts from the release, or in the time of the record where none is known.
+    """
+    return validate_and_read(path, lambda file: _overview(file, spans, between_s), validator=validator)
 
 
 def decimate(columns: tuple[Floats, ...], spans: int) -> tuple[Floats, ...]:
@@ -46,13 +53,14 @@ def decimate(columns: tuple[Floats, ...], spans: int) -> tuple[Floats, ...]:
     return _condensed(columns, max(1, len(columns[0]) // spans))
 
 
-def _overview(file: h5py.File, spans: int, before_release_s: float) -> DecimatedRun:
+def _overview(file: h5py.File, spans: int, between_s: tuple[float, float]) -> DecimatedRun:
     metadata, time_s = read_metadata(file), file[TIME]
-    rows, release_s, first = stored_rows(file), read_number(file, RELEASE), 0
+    rows, release_s = stored_rows(file), read_number(file, RELEASE)
     for analysis in read_analyses(file)[-1:]:
         release_s = analysis.document["events"].get("release_s") or release_s
-    if release_s is not None:
-        first = bisect.bisect_left(time_s, release_s - before_release_s, hi=rows)
+    start_s, end_s = (end + (release_s or 0.0) for end in between_s)
+    first = 0 if start_s == -np.inf else bisect.bisect_left(time_s, start_s, hi=rows)
+    rows = rows if end_s == np.inf else bisect.bisect_right(time_s, end_s, lo=first, hi=rows)
     per_span = max(1, (rows - first) // spans)
     readings = reading_columns(file, metadata, read_changes(file))
     pieces = [_condensed((time_s[part], *readings(part)), per_span) for part in _parts(first, rows, per_span)]

@@ -12,7 +12,7 @@ from app.presenters.runs.analysis_queue import AnalysisQueue
 from app.presenters.runs.changes import Change
 from app.presenters.runs.export_presenter import ExportPresenter
 from app.presenters.runs.import_presenter import ImportPresenter
-from app.presenters.runs.state import BatchOutcome, Column, Overlay, RunFilter, RunsState
+from app.presenters.runs.state import BatchOutcome, Column, Overlay, RunFilter, RunsState, Span, Trace
 from app.presenters.runs.table import RunList
 from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext
@@ -50,6 +50,10 @@ class RunsPresenter(Presenter[RunsState]):
         self._analyses = AnalysisQueue(analysis_worker, self._on_runs_changed)
         self._progress: Progress | None = None
         self._is_listing = False
+        self._coarse: Overlay | None = None
+        """The overlay as it was before the user zoomed in."""
+        self._part: tuple[tuple[str, ...], Span, int] | None = None
+        self._next_part: tuple[Span, int] | None = None
 
     def enter(self) -> None:
         self.refresh()
@@ -89,6 +93,7 @@ class RunsPresenter(Presenter[RunsState]):
     def select(self, paths: tuple[str, ...]) -> None:
         if paths == self.state.selected:
             return
+        self._coarse = None
         self._update(selected=paths, metadata=self._library.metadata(paths))
         readable = self._library.readable(paths)
         if readable:
@@ -98,6 +103,21 @@ class RunsPresenter(Presenter[RunsState]):
         else:
             words = self._library.fault(paths[0]) if paths else ""
             self._update(overlay=Overlay(message=sentence(words)) if paths else None)
+
+    def zoom_overlay(self, span: Span, pixels: int) -> None:
+        """Read the part in view of runs that were decimated; while one is read, only the newest waits."""
+        if self._coarse is None or not any(trace.is_decimated for trace in self._coarse.traces):
+            return
+        if self._part is not None:
+            self._next_part = span, pixels
+            return
+        part = self._part = (self._readable(), span, pixels)
+        self._worker.submit(
+            tasks.load_part,
+            *part,
+            done=partial(self._on_part, part),
+            failed=lambda _failure: self._on_part(part, ()),
+        )
 
     def open_selected(self) -> None:
         if self.state.selected:
@@ -200,7 +220,16 @@ class RunsPresenter(Presenter[RunsState]):
     def _on_overlay(self, paths: tuple[str, ...], overlay: Overlay) -> None:
         self._progress = None
         if paths == self._readable():
+            self._coarse, self._next_part = overlay, None
             self._update(overlay=overlay)
+
+    def _on_part(self, part: tuple[tuple[str, ...], Span, int], traces: tuple[Trace, ...]) -> None:
+        self._part = None
+        if self._coarse is not None and part[0] == self._readable():
+            self._update(overlay=self._coarse.with_parts(traces))
+        following, self._next_part = self._next_part, None
+        if following is not None:
+            self.zoom_overlay(*following)
 
     def _on_changed(self, change: Change, outcome: BatchOutcome) -> None:
         self._progress = None

@@ -1,6 +1,6 @@
 """State of the Runs screen."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
@@ -84,6 +84,9 @@ class MetadataForm:
     mixed: frozenset[str] = frozenset()  # fields in which the runs differ
 
 
+Span = tuple[float, float]
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Trace:
     """One run of the overlay: both gauges (mm), (n,) each, decimated for drawing; NaN breaks the line."""
@@ -93,6 +96,28 @@ class Trace:
     """From release; from the start of the record where no release is known."""
     table: NDArray[np.float64]
     relative: NDArray[np.float64] | None
+    path: str = ""
+
+    @property
+    def is_decimated(self) -> bool:
+        """Tell whether lowest and highest readings of spans stand for the rows."""
+        return len(self.time_s) > 1 and bool(self.time_s[0] == self.time_s[1])
+
+    def with_part(self, part: "Trace") -> "Trace":
+        """The same with a finer part in its place."""
+        if not len(part.time_s):
+            return self
+        before = self.time_s < part.time_s[0]
+        after = self.time_s > part.time_s[-1]
+
+        def joined(values: NDArray[np.float64], finer: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.concatenate((values[before], finer, values[after]))
+
+        relative = None
+        if self.relative is not None and part.relative is not None:
+            relative = joined(self.relative, part.relative)
+        time_s, table = joined(self.time_s, part.time_s), joined(self.table, part.table)
+        return Trace(self.name, time_s, table, relative, self.path)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -103,6 +128,14 @@ class Overlay:
     time_label: str = ""
     unit: str = "mm"
     message: str = ""
+
+    def with_parts(self, parts: tuple[Trace, ...]) -> "Overlay":
+        """The same with finer parts of its runs, by their paths."""
+        finer = {part.path: part for part in parts}
+        traces = (
+            trace.with_part(finer[trace.path]) if trace.path in finer else trace for trace in self.traces
+        )
+        return replace(self, traces=tuple(traces))
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,8 @@
 """Tasks of the Runs screen, executed in its worker processes."""
 
+import contextlib
 import itertools
+import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -33,6 +35,7 @@ from app.presenters.runs.state import (
     Overlay,
     RunAnalysed,
     SizeQuestion,
+    Span,
     Trace,
 )
 from app.runs.batch.executors import ExecutorOptions, open_executor
@@ -141,7 +144,7 @@ def _first_lines(path: Path) -> str:
 def load_overlay(paths: tuple[str, ...]) -> Overlay:
     """Read and decimate runs, aligned at their releases; say which could not be read."""
     overviews, faults = [], []
-    options: dict[str, Any] = {"before_release_s": _BEFORE_RELEASE_S, "validator": shared_validator()}
+    options: dict[str, Any] = {"between_s": (-_BEFORE_RELEASE_S, math.inf), "validator": shared_validator()}
     for path in paths[:MAX_OVERLAID_RUNS]:
         try:
             overviews.append(open_decimated(path, _DRAWN_SPANS, **options))
@@ -161,11 +164,21 @@ def load_overlay(paths: tuple[str, ...]) -> Overlay:
     )
 
 
+def load_part(paths: tuple[str, ...], span: Span, pixels: int) -> tuple[Trace, ...]:
+    """Read the part of runs that is in view, as finely as it is drawn; runs that cannot be read are absent."""
+    traces = []
+    for path in paths[:MAX_OVERLAID_RUNS]:
+        with contextlib.suppress(RunError):
+            run = open_decimated(path, 2 * pixels, between_s=span, validator=shared_validator())
+            traces.append(_run_trace(run))
+    return tuple(traces)
+
+
 def _run_trace(overview: DecimatedRun) -> Trace:
     scale = reading_units(overview.unit)[0].scale
     table, *others = (scale * readings for readings in overview.readings)
     time_s = overview.time_s - (overview.release_s or 0.0)
-    return Trace(overview.path.stem, time_s, table, others[0] if others else None)
+    return Trace(overview.path.stem, time_s, table, others[0] if others else None, str(overview.path))
 
 
 def preview_import(path: str, form: Form, report: ReportProgress) -> ImportPreview:

@@ -3,13 +3,14 @@
 import math
 
 import numpy as np
-from PySide6.QtCore import Qt
+from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.theme import TextRole, Theme, colour
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plot_marks import pen
+from app.qt.widgets.plot_view import X
 from app.qt.widgets.plots import PlotStack, value_at
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext
@@ -27,7 +28,9 @@ _DASHES: tuple[tuple[float, ...], ...] = ((), (6.0, 3.0), (2.0, 3.0))
 
 
 class RunsPreview(QWidget):
-    """Draws an `Overlay`."""
+    """Draws an `Overlay`. A part that the user has zoomed into stays while it is drawn more finely."""
+
+    zoomed = Signal(tuple, int)  # part of the time axis in view (s), and its width in pixels
 
     def __init__(self, theme: Theme) -> None:
         super().__init__()
@@ -35,6 +38,7 @@ class RunsPreview(QWidget):
         self._overlay = Overlay()
         self._stack = PlotStack(theme, [("", "text") for _ in _TITLES])
         self._stack.hovered.connect(self._show_values)
+        self._stack.plots[0].view.sigXRangeChanged.connect(lambda *_: self._report_zoom())
         self._stack.pictured = self  # with the names
         self._curves = [[plot.line() for _ in range(_MOST)] for plot in self._stack.plots]
         self._names = label(role=TextRole.LABEL, wrap=True)
@@ -49,6 +53,7 @@ class RunsPreview(QWidget):
         self.show_overlay(None)
 
     def show_overlay(self, overlay: Overlay | None) -> None:
+        shown = self._overlay
         self._overlay = overlay or Overlay(
             message=gettext("Select runs to see them here, several to compare them.")
         )
@@ -59,9 +64,14 @@ class RunsPreview(QWidget):
         self._names.setVisible(bool(traces))
         self._words.setText(gettext(self._overlay.message))
         self._words.setVisible(bool(self._overlay.message))
-        self._draw()
+        self._draw(keep=_has_same_extent(shown, self._overlay))
 
-    def _draw(self) -> None:
+    def _report_zoom(self) -> None:
+        view = self._stack.plots[0].view
+        if not view.is_home(X):
+            self.zoomed.emit(self._stack.time_range(), int(view.width()))
+
+    def _draw(self, *, keep: bool) -> None:
         traces = self._overlay.traces
         for number, curves in enumerate(zip(*self._curves, strict=True)):
             trace = traces[number] if number < len(traces) else None
@@ -70,16 +80,17 @@ class RunsPreview(QWidget):
                 curve.unit = self._overlay.unit
                 curve.show_line(None if trace is None else trace.time_s, line)
         if traces:
-            self._set_extent(traces)
+            self._set_extent(traces, keep=keep)
         self._restyle()
 
-    def _set_extent(self, traces: tuple[Trace, ...]) -> None:
+    def _set_extent(self, traces: tuple[Trace, ...], *, keep: bool) -> None:
         starts = [float(trace.time_s[0]) for trace in traces if len(trace.time_s)]
         ends = [float(trace.time_s[-1]) for trace in traces if len(trace.time_s)]
         if starts:
-            self._stack.set_time_range(min(starts), max(ends))
+            self._stack.set_time_range(min(starts), max(ends), keep=keep)
         for row, plot in enumerate(self._stack.plots):
-            plot.fit_values(*(line for trace in traces if (line := _lines(trace)[row]) is not None))
+            lines = [line for trace in traces if (line := _lines(trace)[row]) is not None]
+            plot.fit_values(*lines, keep=keep)
 
     def _restyle(self) -> None:
         self._stack.restyle()
@@ -115,6 +126,12 @@ class RunsPreview(QWidget):
             self._stack.show_values(
                 row, at_s, values if len(values) <= _MOST_VALUES else (), self._overlay.unit
             )
+
+
+def _has_same_extent(one: Overlay, other: Overlay) -> bool:
+    """Tell whether two overlays show the same runs, perhaps in other detail."""
+    names = [[(trace.path, trace.name) for trace in overlay.traces] for overlay in (one, other)]
+    return names[0] == names[1] and one.time_label == other.time_label
 
 
 def _lines(trace: Trace | None) -> tuple[np.ndarray | None, np.ndarray | None]:

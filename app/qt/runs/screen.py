@@ -141,6 +141,7 @@ class RunsScreen(QWidget):
         self._table.selected.connect(self._presenter.select)
         self._table.sort_requested.connect(self._presenter.sort_by)
         self._table.open_requested.connect(self._presenter.open_selected)
+        self._preview.zoomed.connect(self._presenter.zoom_overlay)
         self._metadata.edited.connect(self._presenter.edit)
         add_shortcut(self, "Ctrl+F", gettext("Search"), self.focus_search)
         add_shortcut(self, "Ctrl+L", gettext("Show the runs of another folder"), self._choose_folder)

@@ -55,7 +55,7 @@ def assert_drawn_as(overview, run, spans, before_release_s):
 
 def test_each_span_shows_its_extremes(tmp_path, metadata, validator):
     path = stored(tmp_path / "run.h5", metadata)
-    overview = open_decimated(path, 1000, before_release_s=1.0, validator=validator)
+    overview = open_decimated(path, 1000, between_s=(-1.0, np.inf), validator=validator)
     assert (overview.path, overview.unit, overview.release_s) == (path, "m", ENDING.events.release_s)
     assert_drawn_as(overview, open_run(path, trusted=True), 1000, 1.0)
 
@@ -64,14 +64,14 @@ def test_a_later_calibration_is_drawn(tmp_path, metadata, validator):
     path = stored(tmp_path / "run.h5", metadata)
     table = metadata.gauges.table.replace(gain_m_per_count=2 * metadata.gauges.table.gain_m_per_count)
     edit_run(path, "Ada", gauges=metadata.gauges.replace(table=table))
-    overview = open_decimated(path, 700, before_release_s=0.5, validator=validator)
+    overview = open_decimated(path, 700, between_s=(-0.5, np.inf), validator=validator)
     assert_drawn_as(overview, open_run(path, trusted=True), 700, 0.5)
 
 
 def test_the_release_is_that_of_the_newest_analysis(tmp_path, metadata, validator):
     path = stored(tmp_path / "run.h5", metadata, 2000)
     save_analysis(path, ANALYSIS, "hash", {})
-    overview = open_decimated(path, 100, before_release_s=0.25, validator=validator)
+    overview = open_decimated(path, 100, between_s=(-0.25, np.inf), validator=validator)
     assert overview.release_s == ANALYSIS["events"]["release_s"]
     assert overview.time_s[0] == 0.75
 
@@ -96,3 +96,15 @@ def test_the_last_rows_are_drawn(tmp_path, metadata, validator, count):
     assert drawn[-2:] == pytest.approx([np.nanmin(last), np.nanmax(last)], nan_ok=True)
     time_s, value = decimate((np.arange(count), np.arange(count)), 100)
     assert (time_s[0], value[-1]) == (0, count - 1)
+
+
+def test_a_part_of_a_run_is_read_as_finely_as_asked(tmp_path, metadata, validator):
+    path = stored(tmp_path / "run.h5", metadata)
+    run, release_s = open_run(path, trusted=True), ENDING.events.release_s
+    part = open_decimated(path, 4000, between_s=(2.0, 3.0), validator=validator)
+    seen = (run.time_s >= release_s + 2.0) & (run.time_s <= release_s + 3.0)
+    assert np.array_equal(part.time_s, run.time_s[seen])
+    np.testing.assert_array_equal(part.readings[0], run.table_reading[seen])
+    coarse = open_decimated(path, 100, between_s=(2.0, 3.0), validator=validator)
+    assert len(coarse.time_s) == pytest.approx(200, abs=40)
+    assert coarse.time_s[0] == part.time_s[0]
