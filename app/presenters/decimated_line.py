@@ -39,14 +39,14 @@ class DecimatedLine:
         return Polyline(self.time_s[first:end:per_span], self.values[first:end:per_span])
 
     def _rows(self, start_s: float, end_s: float, pixels: int) -> tuple[int, int, int]:
-        """First row and end of a part, and rows of a span; the first row begins a span."""
+        """First row and end of a part of whole spans, and rows of a span."""
         first = max(int(np.searchsorted(self.time_s, start_s)) - 1, 0)
         end = min(int(np.searchsorted(self.time_s, end_s, side="right")) + 1, len(self.time_s))
         per_span = _power_of_two((end - first) // max(pixels, 1))
-        return first - first % per_span, end, per_span
+        return first - first % per_span, min(-(-end // per_span) * per_span, len(self.time_s)), per_span
 
     def _extremes(self, first: int, end: int, per_span: int) -> tuple[Floats, Floats]:
-        """Lowest and highest values of spans of rows; the last may reach beyond `end`."""
+        """Lowest and highest values of spans of rows."""
         depth, size = 0, 1
         while size * _GROUP <= per_span:
             depth, size = depth + 1, size * _GROUP

@@ -105,8 +105,7 @@ class PlotTools:
         self._bar.show()
 
     def hide_bar(self) -> None:
-        """Hide the bar, unless the pointer or the focus is in the stack."""
-        if self._bar is not None and not self._stack.underMouse() and not self._stack.hasFocus():
+        if self._bar is not None:
             self._bar.hide()
 
     def place_bar(self) -> None:

@@ -268,7 +268,8 @@ class PlotStack(QFrame):
 
     def focusInEvent(self, event: QFocusEvent) -> None:  # noqa: N802
         super().focusInEvent(event)
-        self._tools.show_bar()
+        if event.reason() in (Qt.FocusReason.TabFocusReason, Qt.FocusReason.BacktabFocusReason):
+            self._tools.show_bar()
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: N802
         super().leaveEvent(event)
@@ -277,7 +278,8 @@ class PlotStack(QFrame):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:  # noqa: N802
         super().focusOutEvent(event)
-        self._tools.hide_bar()
+        if not self.underMouse():
+            self._tools.hide_bar()
 
     def _arrange(self, heights: Sequence[int]) -> None:
         grid = self._canvas.ci.layout
@@ -340,11 +342,12 @@ class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         return levels[level][1] if level < len(levels) else []
 
     def generateDrawSpecs(self, painter: Any) -> Any:  # noqa: N802
-        """As pyqtgraph; of an axis without numbers only its line, for its ticks have no length."""
-        if self.style["showValues"]:
-            return super().generateDrawSpecs(painter)
-        bounds = self.mapRectFromParent(self.geometry())
-        return (self.pen(), bounds.topLeft(), bounds.topRight()), [], []
+        """As pyqtgraph, without ticks, which have no length; of an axis without numbers only its line."""
+        if not self.style["showValues"]:
+            bounds = self.mapRectFromParent(self.geometry())
+            return (self.pen(), bounds.topLeft(), bounds.topRight()), [], []
+        specs = super().generateDrawSpecs(painter)
+        return None if specs is None else (specs[0], [], specs[2])
 
     def tickValues(self, minVal: float, maxVal: float, size: float) -> Any:  # noqa: N802
         """As pyqtgraph, which asks several times for the same."""

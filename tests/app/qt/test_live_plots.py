@@ -7,9 +7,9 @@ from pytestqt.qtbot import QtBot
 
 from app.presenters.decimated_history import DecimatedHistory
 from app.presenters.record.state import Traces
-from app.qt.widgets import plot_curves
 from app.qt.record.live_plots import LivePlots
 from app.qt.theme import Theme
+from app.qt.widgets import plot_curves
 
 RATE_HZ = 2000.0
 
