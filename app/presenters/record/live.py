@@ -115,7 +115,7 @@ class LiveTraces:
     def with_earlier(self, earlier: "LiveTraces") -> "LiveTraces":
         """Show traces of an earlier run until `restarted`."""
         shown = replace(self, earlier=earlier.earlier or earlier, traces=earlier.traces)
-        return shown.zoomed(self.zoom_s)
+        return shown if self.zoom_s == earlier.zoom_s else shown.zoomed(self.zoom_s)
 
     def zoomed(self, zoom_s: Span | None) -> "LiveTraces":
         """Draw a part of the shown time axis, or all of it, as finely as its pixels allow."""

@@ -380,7 +380,7 @@ class _Reduction:
             traces = traces.cleared(model.pullback_m)
             self._set_session(live_estimate=state.LiveEstimate())
         else:
-            traces = traces.held(traces.traces)
+            traces = traces.with_earlier(model.live)
         self._set(status_bar=bar, monitors=monitors_of(gauges), live=traces)
 
     def _on_engine(self, event: engine.Event) -> None:

@@ -165,7 +165,7 @@ def load_overlay(paths: tuple[str, ...]) -> Overlay:
 
 
 def load_part(paths: tuple[str, ...], span: Span, pixels: int) -> tuple[Trace, ...]:
-    """Read the part of runs that is in view, as finely as it is drawn; runs that cannot be read are absent."""
+    """Read the part of runs that is in view, as finely as it is drawn; unreadable ones are absent."""
     traces = []
     for path in paths[:MAX_OVERLAID_RUNS]:
         with contextlib.suppress(RunError):

@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from looking import clipped_words, visible_words
+from pointing import Hand
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
@@ -262,3 +263,65 @@ def test_the_theme_can_change_at_any_time(stage: Stage, theme: Theme) -> None:
         assert dark.pixelColor(card.x() + 3, card.y()).lightness() < 128
     finally:
         theme.fix(Qt.ColorScheme.Light)
+
+
+def pointing(stage: Stage) -> Hand:
+    QApplication.processEvents()
+    return Hand(stage.screen._plots._stack)
+
+
+def shown_span(stage: Stage) -> tuple[float, float]:
+    return stage.screen._plots._stack.time_range()
+
+
+def test_a_zoomed_part_is_drawn_finely_and_stays_while_samples_come(stage: Stage) -> None:
+    tail(stage)
+    coarse = stage.presenter.state.traces.table
+    hand = pointing(stage)
+    for _ in range(12):
+        hand.wheel(1, hand.place(0.3, 0.5))
+    QApplication.processEvents()
+    start_s, end_s = zoomed = shown_span(stage)
+    line = stage.presenter.state.traces.table
+    assert np.count_nonzero((coarse.time_s >= start_s) & (coarse.time_s <= end_s)) < len(line.time_s)
+    assert np.diff(line.time_s) == pytest.approx(1e-3)
+    assert line.time_s[0] == pytest.approx(start_s, abs=2e-3)
+    assert line.time_s[-1] == pytest.approx(end_s, abs=2e-3)
+    limits = [plot.view.viewRange()[1] for plot in stage.screen._plots._stack.plots]
+    stage.play(10.0, 14.5)
+    QApplication.processEvents()
+    assert shown_span(stage) == zoomed
+    assert [plot.view.viewRange()[1] for plot in stage.screen._plots._stack.plots] == limits
+    np.testing.assert_array_equal(stage.presenter.state.traces.table.time_s, line.time_s)
+    hand.double_click(hand.place(0.5, 0.5))
+    QApplication.processEvents()
+    assert shown_span(stage) == stage.presenter.state.traces.span
+    assert stage.presenter.state.traces.table.time_s[-1] > 9.0
+
+
+def test_a_new_time_axis_is_shown_whole(stage: Stage) -> None:
+    pulling(stage)
+    hand = pointing(stage)
+    hand.wheel(3, hand.place(0.8, 0.5))
+    assert shown_span(stage) != stage.presenter.state.traces.span
+    stage.play(3.5, 10.0)
+    QApplication.processEvents()
+    assert shown_span(stage) == stage.presenter.state.traces.span == (-1.0, 8.0)
+
+
+def test_the_result_is_zoomed_into_long_after_the_run(stage: Stage) -> None:
+    result(stage)
+    before = stage.presenter.state.traces.table
+    stage.recorder.rows = rows_between(END_S + 0.1, END_S + 3.0)
+    stage.presenter.tick()
+    hand = pointing(stage)
+    for _ in range(10):
+        hand.wheel(1, hand.place(0.2, 0.5))
+    QApplication.processEvents()
+    line = stage.presenter.state.traces.table
+    assert np.diff(line.time_s) == pytest.approx(1e-3)
+    seen = (before.time_s > line.time_s[0]) & (before.time_s < line.time_s[-1])
+    assert line.value.max() == pytest.approx(before.value[seen].max(), abs=0.05)
+    hand.drag(hand.place(0.5, 0.5), hand.place(0.4, 0.5), Qt.MouseButton.MiddleButton)
+    QApplication.processEvents()
+    assert stage.presenter.state.traces.table.time_s[-1] > line.time_s[-1]
