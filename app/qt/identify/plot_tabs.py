@@ -81,6 +81,12 @@ class PlotTabs(QStackedWidget):
         for tab, lines in motion.items():
             self.motions[tab].show_lines(lines, slips)
 
+    def set_run_name(self, name: str) -> None:
+        """Name the run in the files of its plots."""
+        for tab in PlotTab:
+            for stack in self._page(tab).findChildren(PlotStack):
+                stack.export_name = f"{name} {gettext(tab.value).lower()}"
+
     def show_tab(self, tab: PlotTab, cursors: Cursors | None) -> None:
         page = self._page(tab)
         page.cursors.show_cursors(cursors)

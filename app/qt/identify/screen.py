@@ -1,6 +1,7 @@
 """The Identify screen: curves at the left, results at the right; or what is missing."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFrame, QPushButton, QSplitter, QStackedWidget, QTabBar, QWidget
@@ -90,6 +91,7 @@ class IdentifyScreen(QWidget):
             return
         self._kind.setText(gettext(_OTHER_KINDS[state.alternative_kind]))
         self._plots.curves.show_curves(state.curves)
+        self._plots.set_run_name(Path(state.title).stem)
         for index, tab in enumerate(PlotTab):
             is_drawn, reason = _drawn(tab, state)
             self._tabs.setTabEnabled(index, is_drawn)

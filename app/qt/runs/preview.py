@@ -13,7 +13,7 @@ from app.qt.widgets.plot_marks import pen
 from app.qt.widgets.plot_view import X
 from app.qt.widgets.plots import PlotStack, value_at
 from app.qt.widgets.text import label
-from messages.i18n import N_, gettext
+from messages.i18n import N_, gettext, ngettext
 
 _TITLES = (
     N_("table displacement u<sub>1</sub>, {unit}"),
@@ -64,6 +64,8 @@ class RunsPreview(QWidget):
         self._names.setVisible(bool(traces))
         self._words.setText(gettext(self._overlay.message))
         self._words.setVisible(bool(self._overlay.message))
+        count = ngettext("{count} run", "{count} runs", len(traces))
+        self._stack.export_name = traces[0].name if len(traces) == 1 else count
         self._draw(keep=_has_same_extent(shown, self._overlay))
 
     def _report_zoom(self) -> None:

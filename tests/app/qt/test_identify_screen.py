@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from looking import clipped_words, visible_words
+from pointing import Hand
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
@@ -538,3 +539,108 @@ def test_a_run_without_slip_says_why_there_is_no_handle(stage: Stage) -> None:
     stage.presenter.on_analysed(analysed(results={}, model=None))
     assert "Nothing slipped" in stage.words()
     assert not stage.screen._scan.isVisible()
+
+
+def plots_of(stage: Stage) -> PlotStack:
+    QApplication.processEvents()
+    return stage.curves._stack
+
+
+def test_a_zoomed_part_stays_under_another_law_and_goes_with_another_run(stage: Stage) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
+    hand = Hand(plots_of(stage))
+    hand.wheel(6, hand.place(0.5, 0.5))
+    hand.wheel(2, hand.place(0.5, 0.5), Qt.KeyboardModifier.ControlModifier)
+    zoomed = [plot.view.viewRange() for plot in stage.curves._stack.plots]
+    stage.presenter.on_analysed(replace(with_scan(), budget=()))
+    assert [plot.view.viewRange() for plot in stage.curves._stack.plots] == zoomed
+    shorter = analysed(
+        time_s=analysed().time_s[:9000],
+        table=Channel(analysed().table.record_m[:9000]),
+        relative=None,
+        model=None,
+    )
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(shorter)
+    assert stage.curves.span() == (pytest.approx(-1.0), pytest.approx(4.999))
+
+
+def test_one_cannot_go_beyond_the_ends_of_the_record(stage: Stage) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
+    hand = Hand(plots_of(stage))
+    hand.wheel(-9, hand.place(0.5, 0.5))
+    curves = stage.presenter.state.curves
+    assert curves is not None
+    assert stage.curves.span() == pytest.approx((curves.time_s[0], curves.time_s[-1]))
+    hand.double_click(hand.place(0.5, 0.5))
+    assert stage.curves.span() == pytest.approx((-1.0, curves.time_s[-1]))
+
+
+def test_arrows_move_the_plot_until_there_are_cursors(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
+    stack = plots_of(stage)
+    qtbot.keyClick(stack, Qt.Key.Key_Plus)
+    before = stage.curves.span()
+    qtbot.keyClick(stack, Qt.Key.Key_Right)
+    assert stage.curves.span()[0] > before[0]
+    moved = stage.curves.span()
+    stage.presenter.toggle_cursors()
+    cursors = stage.presenter.state.cursors
+    qtbot.keyClick(stack, Qt.Key.Key_Right)
+    assert stage.curves.span() == moved
+    assert stage.presenter.state.cursors != cursors
+    qtbot.keyClick(stack, Qt.Key.Key_Home)
+    assert stage.curves.span()[0] == pytest.approx(-1.0)
+
+
+def test_the_keys_of_the_handle_are_left_to_it(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
+    scan = stage.screen._scan
+    qtbot.keyClick(scan._stack, Qt.Key.Key_Right)
+    answer(stage)
+    assert scan._handle.value() > 0.1003
+    qtbot.keyClick(scan._stack, Qt.Key.Key_Home)
+    assert scan._handle.value() == pytest.approx(0.1003)
+    qtbot.keyClick(scan._stack, Qt.Key.Key_Plus)
+    start, end = scan._stack.time_range()
+    assert end - start == pytest.approx(0.8 * 0.008)
+
+
+@pytest.mark.parametrize("side", PlotTab)
+def test_the_wheel_zooms_and_a_double_click_resets_every_plot(stage: Stage, side: PlotTab) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(replace(with_scan(), friction_by_slip=by_slip()))
+    stage.presenter.set_tab(side)
+    QApplication.processEvents()
+    stacks = [stack for stack in stage.screen.findChildren(PlotStack) if stack.isVisible()]
+    for stack in stacks:
+        hand, whole = Hand(stack), stack.plots[-1].view.viewRange()
+        at = hand.place(0.5, 0.5, len(stack.plots) - 1)
+        hand.wheel(2, at)
+        hand.wheel(2, at, Qt.KeyboardModifier.ControlModifier)
+        for (low, high), (start, end) in zip(stack.plots[-1].view.viewRange(), whole, strict=True):
+            assert high - low == pytest.approx(0.64 * (end - start))
+        hand.double_click(at)
+        np.testing.assert_allclose(stack.plots[-1].view.viewRange(), whole)
+        assert stack.curves_in_view(), "there is something to save as a table"
+        assert stack.accessibleName()
+
+
+def test_curves_are_saved_by_the_name_of_the_run_with_names_and_units(stage: Stage) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(analysed())
+    stack = plots_of(stage)
+    assert stack.export_name == "20260112_1FFM0_001 displacement"
+    assert [curve.title for curve in stack.curves_in_view()] == [
+        "table displacement, record, mm",
+        "table displacement, simulation, mm",
+        "relative displacement, record, mm",
+        "relative displacement, simulation, mm",
+        "table displacement, residual, µm",
+        "relative displacement, residual, µm",
+    ]
+    assert {curve.x_title for curve in stack.curves_in_view()} == {"time from release, s"}

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from looking import clipped_words, plain, visible_words
+from pointing import Hand
 from PySide6.QtCore import QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QTextDocument
 from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
@@ -287,3 +288,67 @@ def test_files_of_other_programs_are_chosen_and_open_the_import_dialog(stage: St
     dialog.close()
     assert stage.imports == 1
     assert stage.calls("survey_file")[-1].arguments[0] == "/elsewhere/x.csv"
+
+
+def decimated(name: str, start_s: float, end_s: float, spans: int) -> Trace:
+    """A trace of lowest and highest readings, as of a long run."""
+    time_s = np.repeat(np.linspace(start_s, end_s, spans), 2)
+    return Trace(name, time_s, np.tile([-10.0, 10.0], spans), None, f"/runs/{name}.h5")
+
+
+def test_the_part_of_a_long_run_in_view_is_read_more_finely(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(0)
+    (path,) = stage.presenter.state.selected
+    name = Path(path).stem
+    stage.answer("load_overlay", Overlay((decimated(name, 0.0, 3600.0, 1500),), "time from release, s"))
+    QApplication.processEvents()
+    stack = stage.screen._preview._stack
+    hand = Hand(stack)
+    for _ in range(3):
+        hand.wheel(5, hand.place(0.5, 0.5))
+    start_s, end_s = zoomed = stack.time_range()
+    first, *_ = stage.calls("load_part")
+    assert len(stage.calls("load_part")) == 1, "one is read at a time"
+    first.done((decimated(name, *first.arguments[1], 900),))
+    last = stage.calls("load_part")[-1]
+    assert last.arguments == ((path,), pytest.approx(zoomed), int(stack.plots[0].view.width()))
+    last.done((decimated(name, start_s, end_s, 900),))
+    time_s, _ = stage.screen._preview._curves[0][0].samples()
+    assert np.count_nonzero((time_s >= start_s) & (time_s <= end_s)) == pytest.approx(1800, abs=4)
+    assert (time_s[0], time_s[-1]) == (0.0, 3600.0)
+    assert (np.diff(time_s) >= 0.0).all()
+    assert stack.time_range() == zoomed
+    hand.double_click(hand.place(0.5, 0.5))
+    assert stack.time_range() == (0.0, 3600.0)
+
+
+def test_a_run_that_is_drawn_whole_is_not_read_again_and_another_is_shown_whole(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(0)
+    stage.answer("load_overlay", Overlay((trace("one"),), "time from release, s"))
+    QApplication.processEvents()
+    stack = stage.screen._preview._stack
+    hand = Hand(stack)
+    hand.wheel(5, hand.place(0.5, 0.5))
+    assert stage.calls("load_part") == []
+    stage.click_row(1)
+    stage.answer("load_overlay", Overlay((trace("two"),), "time from release, s"))
+    assert stack.time_range() == (-1.0, 9.0)
+
+
+def test_a_picture_of_the_preview_has_the_names_of_the_runs(stage: Stage) -> None:
+    stage.list_runs()
+    stage.click_row(0)
+    stage.answer("load_overlay", Overlay((trace("one"), trace("two")), "time from release, s"))
+    QApplication.processEvents()
+    preview = stage.screen._preview
+    assert preview._stack.pictured is preview
+    assert preview._stack.export_name == "2 runs"
+    titles = [curve.title for curve in preview._stack.curves_in_view()]
+    assert titles == [
+        "one, table displacement, mm",
+        "two, table displacement, mm",
+        "one, relative displacement, mm",
+        "two, relative displacement, mm",
+    ]
