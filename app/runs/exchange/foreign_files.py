@@ -3,11 +3,13 @@
 import contextlib
 import gzip
 import importlib
+import io
+import struct
 import tempfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +24,8 @@ from app.runs.exchange.tables import Table, TimeAxis
 from messages.i18n import N_
 from messages.message import Message, option
 
-_GZIP = b"\x1f\x8b"
+_GZIP, _GZIP_SIZE = b"\x1f\x8b", struct.Struct("<I")
+_DEFLATE_RATIO = 1032  # highest of deflate (zlib, "Technical details")
 _PIECE_BYTES = 1 << 22
 _UNPACKED_MOST_BYTES = 2 << 30
 
@@ -88,18 +91,32 @@ def _unpack(path: Path, plain: Path, report: ReportShare) -> None:
     done, size_bytes = 0, max(path.stat().st_size, 1)
     try:
         with path.open("rb") as source, gzip.open(source) as packed, plain.open("wb") as file:
+            _check_unpacked(path, _declared_bytes(source))
             while data := packed.read(_PIECE_BYTES):
                 done += len(data)
-                if done > _UNPACKED_MOST_BYTES:
-                    raise ImportFileError(
-                        "{path} unpacks to more than {gigabytes:g} GB. Unpack it and import a part",
-                        path=path,
-                        gigabytes=_UNPACKED_MOST_BYTES / 2**30,
-                    )
+                _check_unpacked(path, done)
                 file.write(data)
                 report(min(source.tell() / size_bytes, 1.0))
-    except (EOFError, gzip.BadGzipFile, zlib.error):
+    except (EOFError, gzip.BadGzipFile, struct.error, zlib.error):
         raise ImportFileError("{path} is a damaged gzip file. Pack it again", path=path) from None
+
+
+def _declared_bytes(source: BinaryIO) -> int:
+    """Size of what is packed, less a multiple of 4 GB, as the end of a file says (RFC 1952); 0 if it lies."""
+    packed_bytes = source.seek(0, io.SEEK_END)
+    source.seek(max(packed_bytes - _GZIP_SIZE.size, 0))
+    (size_bytes,) = _GZIP_SIZE.unpack(source.read(_GZIP_SIZE.size))
+    source.seek(0)
+    return int(size_bytes) if size_bytes <= _DEFLATE_RATIO * packed_bytes else 0
+
+
+def _check_unpacked(path: Path, size_bytes: int) -> None:
+    if size_bytes > _UNPACKED_MOST_BYTES:
+        raise ImportFileError(
+            "{path} unpacks to more than {gigabytes:g} GB. Unpack it and import a part",
+            path=path,
+            gigabytes=_UNPACKED_MOST_BYTES / 2**30,
+        )
 
 
 def find_format(path: Path) -> Format | None:

@@ -1,5 +1,6 @@
 """Foreign files that are larger than they look: refused by their declared sizes, before they are read."""
 
+import gzip
 import subprocess
 import sys
 import time
@@ -10,7 +11,7 @@ import pytest
 from scipy.io import savemat
 
 from app.runs.errors import ImportFileError
-from app.runs.exchange import csv_layout, reading_process
+from app.runs.exchange import csv_layout, foreign_files, reading_process
 from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.formats import matlab
 from app.runs.exchange.importing import ImportPlan, read_record
@@ -115,6 +116,25 @@ def test_a_message_names_no_more_columns_than_can_be_read(tmp_path):
     assert said.startswith("many.csv has no column 't'. Choose one of 500: channel 0 of the laboratory")
     assert said.endswith("...")
     assert len(said) < 1000
+
+
+def test_a_packed_file_that_says_to_be_too_large_is_not_unpacked(tmp_path, monkeypatch):
+    path, pieces = tmp_path / "zeros.csv.gz", []
+    text = b"t,u1\n" + b"".join(b"%d,1\n" % row for row in range(ROWS))
+    path.write_bytes(gzip.compress(text + b"#" * 100_000))
+    monkeypatch.setattr(foreign_files, "_UNPACKED_MOST_BYTES", 50_000)
+    with pytest.raises(ImportFileError, match=r"zeros.csv.gz unpacks to more than"):
+        read_record(path, PLAN, pieces.append)
+    assert pieces == []
+    monkeypatch.setattr(foreign_files, "_UNPACKED_MOST_BYTES", 1 << 30)
+    assert len(read_record(path, PLAN)) == ROWS
+    for end in (b"\xff" * 4, b""):  # it lies, or it is cut
+        path.write_bytes(gzip.compress(text)[:-4] + end)
+        with pytest.raises(ImportFileError, match=r"zeros.csv.gz is a damaged gzip file"):
+            read_record(path, PLAN)
+    path.write_bytes(b"\x1f\x8b")
+    with pytest.raises(ImportFileError, match=r"zeros.csv.gz is a damaged gzip file"):
+        read_record(path, PLAN)
 
 
 class RepeatedProgress:
