@@ -121,6 +121,7 @@ drill: setup
 	$(BIN)/python -m tests.drills.starved --count 14
 	$(BIN)/python -m tests.drills.damaged_runs --count 10000
 	$(BIN)/python -m tests.drills.hostile_texts --count 20000
+	$(BIN)/python -m tests.drills.oversized_files
 	$(BIN)/python -m tests.drills.hostile_bytes --megabytes 1000 --frames 1000000
 
 peers: setup
