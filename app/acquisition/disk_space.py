@@ -73,13 +73,16 @@ def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> Mess
 
 
 class DiskSpaceMonitor:
-    """Reads the free space of one folder after another, twice a second; the folder need not exist."""
+    """Reads the free space of one folder after another, twice a second; the folder need not exist.
 
-    def __init__(self, folder: Path) -> None:
+    None follows no folder until `begin`.
+    """
+
+    def __init__(self, folder: Path | None) -> None:
         self._folder = folder
         self._demand: DiskDemand | None = None
         self._is_warned = False
-        self.free_bytes = free_bytes(folder)  # of the folder that is followed; None if unknown
+        self.free_bytes: int | None = None  # of the folder that is followed; None if unknown
         self._changing = threading.Lock()
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._poll, name="free space", daemon=True)
@@ -115,12 +118,13 @@ class DiskSpaceMonitor:
         self._stopping.set()
 
     def _poll(self) -> None:
-        while not self._stopping.wait(_POLL_PERIOD_S):
+        while not self._stopping.is_set():
             folder = self._folder
-            free = free_bytes(folder)
+            free = None if folder is None else free_bytes(folder)
             with self._changing:
                 if folder == self._folder:
                     self.free_bytes = free
+            self._stopping.wait(_POLL_PERIOD_S)
 
 
 def _megabytes(size: float) -> str:

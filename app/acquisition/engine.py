@@ -8,7 +8,6 @@ stored, and the process ends.
 import logging
 import signal
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -31,6 +30,7 @@ from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
 from drivers.errors import DriverError
+from drivers.simulated.identity import is_simulated_device
 from messages.message import EMPTY, Message, as_message, message, message_of
 
 _log = logging.getLogger(__name__)
@@ -90,6 +90,9 @@ class Engine:
         events: EventSender[messages.Event],
     ) -> None:
         self._port = connect.port
+        self.is_simulated = connect.port.simulated or is_simulated_device(
+            stream.identity, stream.port_identity
+        )
         self._stand = stand
         self._gauges = gauges
         self._stream = stream
@@ -106,8 +109,8 @@ class Engine:
         self._recording: Recording | None = None
         self._sequence = run_setup.RunSequence()
         self._last_slip: ObservedSlip | None = None
-        self._disk = DiskSpaceMonitor(Path(tempfile.gettempdir()))
         self._sleep_prevention = SleepPrevention()
+        self._disk = DiskSpaceMonitor(Path(connect.directory) if connect.directory else None)
         self._health_due_s = 0.0
         self._is_asked_to_quit = False
         self._is_quitting = False
@@ -225,7 +228,7 @@ class Engine:
         demand = self._disk_demand()
         note = check_disk_space(folder, run, demand)
         metadata = run_setup.build_metadata(
-            run, self._stand, self._gauges, self._stream, simulated=self._port.simulated
+            run, self._stand, self._gauges, self._stream, simulated=self.is_simulated
         )
         self._history.span = round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz)
         journal = run_setup.create_run_journal(self._port, run, metadata)
@@ -323,7 +326,7 @@ class Engine:
                 missing_estimated=losses.missing_estimated,
                 damaged=losses.damaged,
                 overloaded=losses.overloaded,
-                free_disk_bytes=self._disk.free_bytes or 0,
+                free_disk_bytes=self._disk.free_bytes,
                 bytes_per_s=self._disk_demand().bytes_per_s,
             )
         )
@@ -362,7 +365,8 @@ def serve(
         signal.signal(signal.SIGTERM, lambda *_: engine.ask_to_quit())
         device = stream.identity
         _log.info("connected: %s %s, %g Hz", device.name, device.firmware, stream.rate_hz)
-        events.send(messages.Connected(device.name, device.firmware, stream.rate_hz, str(ring.path)))
+        facts = device.name, device.firmware, stream.rate_hz, str(ring.path)
+        events.send(messages.Connected(*facts, simulated=engine.is_simulated))
         events.send(messages.StateChanged(messages.PullbackState.IDLE, 0.0))
         engine.run()
 

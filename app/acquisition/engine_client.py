@@ -42,11 +42,20 @@ class EngineClient:
 
     @classmethod
     def start(
-        cls, port: messages.PortSettings, stand_file: str, gauges_file: str, *, low_latency: bool = False
+        cls,
+        port: messages.PortSettings,
+        stand_file: str,
+        gauges_file: str,
+        *,
+        low_latency: bool = False,
+        directory: str = "",
     ) -> Self:
-        """Start an engine and connect it; new rows come within 20 ms with `low_latency`, else 0.14 s."""
+        """Start an engine and connect it; new rows come within 20 ms with `low_latency`, else 0.14 s.
+
+        `directory` is the folder of the runs to come.
+        """
         engine = cls(spawn("app.acquisition.engine"))
-        engine.send(messages.Connect(port, stand_file, gauges_file, low_latency))
+        engine.send(messages.Connect(port, stand_file, gauges_file, low_latency, directory))
         return engine
 
     @property
@@ -141,7 +150,11 @@ def record_runs(
     without a connection or with impossible settings. Raises KeyboardInterrupt if interrupted before a run was
     armed.
     """
-    with _interrupts() as interrupted, EngineClient.start(port, stand_file, gauges_file) as engine:
+    files = stand_file, gauges_file
+    with (
+        _interrupts() as interrupted,
+        EngineClient.start(port, *files, directory=run.directory) as engine,
+    ):
         is_armed = is_stopped = False
         while True:
             event = engine.wait(_WAIT_S)

@@ -67,7 +67,7 @@ class PortSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     relative_url: str = ""
     """Port of the device of gauge 2, where each gauge has a device and a port of its own."""
     simulated: bool = False
-    """The device is known to be simulated; one that can be recognised is found out without this."""
+    """The owner knows that the device is simulated; one that can be recognised as such needs no such word."""
 
 
 class RunSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -101,6 +101,8 @@ class Connect(msgspec.Struct, frozen=True, tag=True):
     stand_file: str
     gauges_file: str
     low_latency: bool = False
+    directory: str = ""
+    """Folder of the runs to come, whose free space `Health` has until the first run says its own."""
 
 
 class Arm(msgspec.Struct, frozen=True, tag=True):
@@ -133,6 +135,7 @@ class Connected(msgspec.Struct, frozen=True, tag=True):
     firmware: str
     rate_hz: float
     ring_path: str
+    simulated: bool = False
 
 
 class StandPosition(msgspec.Struct, frozen=True):
@@ -206,7 +209,7 @@ class Health(msgspec.Struct, frozen=True, tag=True):
     missing_estimated: int
     damaged: int
     overloaded: int
-    free_disk_bytes: int
+    free_disk_bytes: int | None  # where runs are stored; None where it is not known
     bytes_per_s: float = 0.0  # what a recording writes, journal included; 0 where nothing has come yet
 
 

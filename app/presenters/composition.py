@@ -2,6 +2,7 @@
 
 import datetime
 import os
+from functools import partial
 from pathlib import Path
 
 from app.acquisition.engine_client import EngineClient
@@ -55,7 +56,7 @@ def make_window_presenter(
     stand, gauges = files.load_stand(), files.load_gauges()
     context = StandContext(stand, gauges, stand.all_series, Path(personal.recordings))
     return WindowPresenter(
-        Connection(start_engine, SimulatedStand.start, errors.report),
+        Connection(partial(start_engine, directory=context.directory), SimulatedStand.start, errors.report),
         Worker(errors.report),
         WorkerPool(errors.report),
         WindowContext(
@@ -94,10 +95,11 @@ def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> St
     return StartState(all_series, simulation.series, protocols, form=form, recordings=folder)
 
 
-def start_engine(port: PortSettings) -> EngineClient:
+def start_engine(port: PortSettings, directory: Path) -> EngineClient:
     """Start an engine that connects to `port`; whether it can, its events tell. Raises OSError.
 
-    It takes the settings that are in use now: a calibration may have been made meanwhile.
+    It takes the settings that are in use now: a calibration may have been made meanwhile. `directory` is the
+    folder of the runs.
     """
     stand, gauges = (str(files.settings_file(name)) for name in ("stand.toml", "gauges.toml"))
-    return EngineClient.start(port, stand, gauges, low_latency=True)
+    return EngineClient.start(port, stand, gauges, low_latency=True, directory=str(directory))

@@ -47,7 +47,7 @@ def space(disks):
 
 
 def test_it_follows_what_is_free_and_one_folder_after_another(disks, space):
-    assert space.free_bytes == 10
+    wait_for(lambda: space.free_bytes == 10)
     disks[Path("/a")] = 11
     wait_for(lambda: space.free_bytes == 11)
     space.begin(Path("/b"), DEMAND)
@@ -56,7 +56,25 @@ def test_it_follows_what_is_free_and_one_folder_after_another(disks, space):
     assert space.free_bytes is None
 
 
+def test_no_folder_has_no_figure_until_a_run_names_one(disks):
+    space = DiskSpaceMonitor(None)
+    time.sleep(0.05)
+    assert space.free_bytes is None
+    space.begin(Path("/b"), DEMAND)
+    assert space.free_bytes == 20
+    space.stop()
+
+
+def test_a_disk_that_hangs_from_the_start_holds_nobody_up(disks):
+    space = DiskSpaceMonitor(Path("/hangs"))
+    assert space.free_bytes is None
+    disks[Path("/hangs")].set()
+    wait_for(lambda: space.free_bytes == 30)
+    space.stop()
+
+
 def test_a_disk_that_begins_to_hang_holds_nobody_up(disks, space):
+    wait_for(lambda: space.free_bytes == 10)
     disks[Path("/a")] = disks[Path("/hangs")]
     time.sleep(0.05)
     assert space.free_bytes == 10, "what was known last"
