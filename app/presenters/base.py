@@ -66,6 +66,7 @@ class Tone(StrEnum):
     OK = "ok"
     WARN = "warn"
     BAD = "bad"
+    STALE = "stale"  # what is shown was true once
 
 
 @dataclass(frozen=True, slots=True)

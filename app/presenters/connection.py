@@ -19,6 +19,7 @@ from app.acquisition.messages import (
 )
 from app.acquisition.ring import RingRows
 from app.presenters.base import SimulationStarted
+from app.presenters.device_status import DeviceMonitor, DeviceStatus
 from app.presenters.error_reports import ErrorReport, error_report
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import Gesture, SimulatedStandOptions
@@ -62,10 +63,12 @@ class Connection:
         start_engine: Callable[[PortSettings], EngineClient],
         start_stand: Callable[[SimulatedStandOptions], SimulatedStand],
         report_error: Callable[[ErrorReport], None],
+        monitor: DeviceMonitor | None = None,
     ) -> None:
         self._start_engine = start_engine
         self._start_stand = start_stand
         self._report_error = report_error
+        self._monitor = monitor or DeviceMonitor()
         self._thread: threading.Thread | None = None
         self._opening: Future[_Opened] | None = None
         self._opened: _Opened | None = None
@@ -77,6 +80,11 @@ class Connection:
 
     def open_port(self, port: PortSettings) -> None:
         self._open(lambda: _Opened(self._start_engine(port)))
+
+    @property
+    def status(self) -> DeviceStatus:
+        """Whether the device sends; to be asked when `new_rows` was."""
+        return self._monitor.status()
 
     @property
     def stand(self) -> SimulatedStand | None:
@@ -92,6 +100,7 @@ class Connection:
         events: list[Event | SimulationStarted] = [*started, *self._opened.engine.poll()]
         for event in events:
             self._opened.pull_for_each_run(event)
+            self._monitor.on_event(event)
         if any(isinstance(event, Failed) for event in events):
             self.disconnect()
         return events
@@ -104,6 +113,7 @@ class Connection:
         """Samples since the last call, also given to all listeners; None without any."""
         rows = None if self._opened is None else self._opened.engine.new_rows()
         if rows is not None:
+            self._monitor.on_rows(rows)
             for listener in self._listeners:
                 listener(rows)
         return rows
@@ -116,6 +126,7 @@ class Connection:
 
         A connection that is being opened is ended as soon as it is open.
         """
+        self._monitor.reset()
         opening, opened = self._opening, self._opened
         self._opening = self._opened = None
         if opening is not None:

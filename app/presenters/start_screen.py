@@ -20,7 +20,10 @@ class PortChoice:
 
 @dataclass(frozen=True, slots=True)
 class StartState:
-    """State of the screen. `busy` names the work in progress, `connected` the connected device."""
+    """State of the screen. `busy` names the work in progress, `connected` the connected device.
+
+    `stopped_at` is the time of day of its last sample, if none comes any more.
+    """
 
     all_series: tuple[str, ...]
     series: str
@@ -31,6 +34,7 @@ class StartState:
     recordings: str = ""
     busy: str = ""
     connected: str = ""
+    stopped_at: str = ""
 
     @property
     def selected_protocol(self) -> DeviceDriver | None:
@@ -75,7 +79,10 @@ class StartPresenter(Presenter[StartState]):
         self._update(busy=what)
 
     def set_connected(self, device: str) -> None:
-        self._update(connected=device, busy="")
+        self._update(connected=device, busy="", stopped_at="")
+
+    def set_stopped(self, stopped_at: str) -> None:
+        self._update(stopped_at=stopped_at)
 
 
 def port_settings(form: ConnectForm) -> PortSettings:

@@ -21,6 +21,7 @@ from app.presenters.base import (
 )
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.connection import Connection
+from app.presenters.device_status import DeviceStatus
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
@@ -93,6 +94,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._open_again: Callable[[], None] | None = None
         self._open_stand_instead: Callable[[], None] | None = None
         self._amplifier = ""  # connected or being connected; empty without one, and with a simulated stand
+        self._device = DeviceStatus()
         self._true_friction: float | None = None
         self._true_frictions: dict[str, float | None] = {}
         stand, author = context.stand, getpass.getuser()
@@ -225,6 +227,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._on_engine_event(event)
         for presenter in self.presenters.values():
             presenter.tick()
+        self._follow_device()
         self._analysis.poll()
 
     def close(self) -> None:
@@ -268,6 +271,15 @@ class WindowPresenter(Presenter[WindowState]):
         self.record.dispatch(Notification.DISCONNECTED)
         self.gauges.on_disconnected()
         self.start.set_connected("")
+
+    def _follow_device(self) -> None:
+        """Tell the screens whether samples come; after their `tick`, in which the samples are taken."""
+        status = self._connection.status
+        if status != self._device:
+            self._device = status
+            self.record.dispatch(status)
+            self.gauges.on_device_status(status)
+            self.start.set_stopped(status.stopped_at)
 
     def _on_engine_event(self, event: Event | SimulationStarted) -> None:
         if isinstance(event, SimulationStarted):

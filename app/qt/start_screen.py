@@ -65,8 +65,7 @@ class StartScreen(QWidget):
         self._verified.setText(verified[:1].upper() + verified[1:])
         show_chip(self._error, Chip(state.form_error, Tone.BAD))
         self._folder.setText(gettext("Runs are stored in {folder}", folder=break_path(state.recordings)))
-        connected = gettext("Connected: {device}", device=state.connected) if state.connected else ""
-        self._status.setText(state.busy or connected)
+        show_chip(self._status, _connection_chip(state))
         self._disconnect.setVisible(bool(state.connected))
         for button in (self._try, self._connect):
             button.setEnabled(not state.busy)
@@ -206,6 +205,15 @@ class _Form(QWidget):
         self._rare.setLayout(rare)
         self._rare.hide()
         make_column(usual, self._rare, make_row(self._more, STRETCH), spacing=8, of=self)
+
+
+def _connection_chip(state: StartState) -> Chip:
+    if state.busy or not state.connected:
+        return Chip(state.busy)
+    if state.stopped_at:
+        text = gettext("{device}: no samples since {time}", device=state.connected, time=state.stopped_at)
+        return Chip(text, Tone.BAD)
+    return Chip(gettext("Connected: {device}", device=state.connected))
 
 
 def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:

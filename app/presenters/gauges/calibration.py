@@ -21,7 +21,9 @@ from app.acquisition.ring import RingRows
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, State, TaskFailure, Tone
 from app.presenters.gauges.state import (
     CONNECTION_LOST,
+    DEVICE_LOST,
     NO_DEVICE,
+    NO_SAMPLES,
     CalibrationData,
     CalibrationFit,
     CalibrationForm,
@@ -50,7 +52,7 @@ _FITTED_FROM: Final = 2
 class ReadingPresenter(Presenter[State]):
     """Base of a tab that averages readings; calls `on_kept` when it has written a file.
 
-    Its state has the fields `message` and `reading_status`.
+    Its state has the fields `message`, `reading_status` and `stopped_at`.
     """
 
     def __init__(
@@ -60,6 +62,12 @@ class ReadingPresenter(Presenter[State]):
         self._averager = ReadingAverager(recent)
         self._worker = worker
         self._on_kept = on_kept
+        self._stopped_at = ""
+
+    def set_stopped(self, stopped_at: str) -> None:
+        """Samples have stopped at this time of day, which ends a reading; "" if they come again."""
+        self._stopped_at = stopped_at
+        self._update(stopped_at=stopped_at)
 
     def _show_error(self, error: MessageError | TaskFailure, **changes: Any) -> None:
         self._update(message=Chip(sentence(error.message), Tone.BAD), **changes)
@@ -92,7 +100,8 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         super().__init__(CalibrationState(live_note=gettext(NO_DEVICE)), recent, worker, on_kept)
         self._recent = recent
         self._now = now
-        self._is_connected = False
+        self._device = ""
+        self._device_of_points = ""
         self._dial_mm = 0.0
         self._file_name = ""
 
@@ -111,8 +120,9 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         except FormError as error:
             self._show_error(error)
             return
-        if not self._is_connected or not self._averager.start():
-            self._update(message=Chip(gettext(NO_DEVICE), Tone.WARN))
+        fault = self._why_not_taken()
+        if fault:
+            self._update(message=Chip(fault, Tone.WARN))
             return
         self._dial_mm = dial_mm
         status = gettext("Averaging at {dial:g} mm: hold the table still", dial=dial_mm)
@@ -135,6 +145,14 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
     def save(self) -> None:
         if not self.state.can_save:
             return
+        if self._stopped_at or self._device != self._device_of_points:
+            template = N_(
+                "Not saved: {device}, which these readings are of, sends nothing. Connect it and save again;"
+                " the readings are kept in {file}"
+            )
+            text = gettext(template, device=self._device_of_points, file=self._file_name)
+            self._update(message=Chip(text, Tone.BAD))
+            return
         form, today = self.state.form, self._now().date()
         try:
             data, valid_until = self._data(), _last_day(form.valid_until, today)
@@ -147,17 +165,24 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         given = form, data, today, valid_until, stated
         self._worker.submit(tasks.save_calibration, *given, done=done, failed=failed)
 
-    def set_connected(self, is_connected: bool) -> None:
-        """Live samples come from now on, or no longer."""
-        self._is_connected = is_connected
+    def set_device(self, device: str) -> None:
+        """Live samples come from this device from now on, or from none."""
+        self._device = device
         was_averaging = self._averager.is_active
         self._averager.stop()
         self._update(live_value="", live_note=gettext(NO_DEVICE), reading_status="", offers_reconnect=False)
         if was_averaging:
             self._update(message=Chip(gettext(CONNECTION_LOST), Tone.WARN))
 
+    def set_stopped(self, stopped_at: str) -> None:
+        super().set_stopped(stopped_at)
+        if stopped_at and self._averager.is_active:
+            self._averager.stop()
+            text = gettext(DEVICE_LOST, time=stopped_at)
+            self._update(reading_status="", message=Chip(text, Tone.BAD))
+
     def tick(self) -> None:
-        if not self._is_connected:
+        if not self._device:
             return
         rows = self._recent.since(self._recent.end_s - _LIVE_S)
         if rows is not None:
@@ -165,6 +190,15 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         average = self._take_reading(self.state.form.gauge)
         if average is not None:
             self._add_point(average, self._dial_mm)
+
+    def _why_not_taken(self) -> str:
+        """Begin a reading; return why none can be taken, else an empty text."""
+        if self._stopped_at:
+            return gettext(NO_SAMPLES, time=self._stopped_at)
+        if self.state.points and self._device != self._device_of_points:
+            template = N_("The readings before are of {device}: start over to calibrate with {other}")
+            return gettext(template, device=self._device_of_points, other=self._device or gettext("none"))
+        return "" if self._device and self._averager.start() else gettext(NO_DEVICE)
 
     def _show_live(self, rows: RingRows) -> None:
         try:
@@ -183,6 +217,7 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
             text = gettext("{words}, though still creeping by {creep}", words=text, creep=creep)
             tone = Tone.WARN
         if not self.state.points:
+            self._device_of_points = self._device
             self._file_name = f"readings-{_NAMES[self.state.form.gauge]}-{self._now():%Y-%m-%d-%H%M%S}.csv"
         points = (*self.state.points, CalibrationPoint(average.counts, dial_mm))
         self._update(points=points, reading_status="", message=Chip(text, tone))
@@ -214,7 +249,7 @@ class CalibrationPresenter(ReadingPresenter[CalibrationState]):
         text = gettext("Written to {file}.", file=file)
         if previous:
             text += " " + gettext("The one before is kept as {file}.", file=previous)
-        offers_reconnect = self.state.form.use and self._is_connected
+        offers_reconnect = self.state.form.use and bool(self._device)
         self._update(message=Chip(text, Tone.OK), can_save=True, offers_reconnect=offers_reconnect)
         self._on_kept()
 

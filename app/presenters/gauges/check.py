@@ -11,6 +11,7 @@ from app.presenters.gauges.calibration import ReadingPresenter
 from app.presenters.gauges.state import (
     CONNECTION_LOST,
     NO_DEVICE,
+    NO_SAMPLES,
     CheckForm,
     CheckKind,
     CheckOutcome,
@@ -20,7 +21,7 @@ from app.presenters.number_text import FormError, parse_field
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
 from config.schema import Gauges
-from messages.i18n import gettext
+from messages.i18n import N_, gettext
 
 if TYPE_CHECKING:
     from app.presenters.gauges import tasks
@@ -44,6 +45,8 @@ class CheckPresenter(ReadingPresenter[CheckState]):
     def advance(self) -> None:
         if self._gauges is None:
             self._update(message=Chip(gettext(NO_DEVICE), Tone.WARN))
+        elif self._stopped_at:
+            self._update(message=Chip(gettext(NO_SAMPLES, time=self._stopped_at), Tone.WARN))
         elif not self.state.is_started:
             self._start()
         elif not self._averager.is_active and self.state.instruction:
@@ -58,13 +61,24 @@ class CheckPresenter(ReadingPresenter[CheckState]):
 
     def on_connected(self, gauges: Gauges | None, device: str = "") -> None:
         self._gauges, self._device = gauges, device
-        if self.state.is_started:
+        if self._awaits_reading:
             self._end(Chip(gettext(CONNECTION_LOST), Tone.WARN))
+
+    def set_stopped(self, stopped_at: str) -> None:
+        super().set_stopped(stopped_at)
+        if stopped_at and self._awaits_reading:
+            template = N_("No sample came after {time}: the check is broken off, and nothing is kept")
+            self._end(Chip(gettext(template, time=stopped_at), Tone.BAD))
 
     def tick(self) -> None:
         average = self._take_reading(self.state.form.gauge)
         if average is not None:
             self._on_reading(average)
+
+    @property
+    def _awaits_reading(self) -> bool:
+        """Tell whether a check is under way whose readings are not both taken."""
+        return self.state.is_started and bool(self.state.instruction)
 
     def _start(self) -> None:
         try:

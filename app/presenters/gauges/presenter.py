@@ -11,6 +11,7 @@ from app.acquisition.averaged_counts import WINDOW_S, RecentSamples
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, TaskFailure, Tone
+from app.presenters.device_status import DeviceStatus
 from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.check import CheckPresenter
 from app.presenters.gauges.ports import PortsPresenter
@@ -87,7 +88,7 @@ class GaugesPresenter(Presenter[GaugesState]):
 
     def on_connected(self, event: Connected) -> None:
         self._rate_hz = event.rate_hz
-        self.calibration.set_connected(True)
+        self.calibration.set_device(event.device)
         self.check.on_connected(self._stream_gauges, event.device)
         self._update(device=event.device, health_note=gettext(_WAITING))
 
@@ -96,9 +97,17 @@ class GaugesPresenter(Presenter[GaugesState]):
         self._stream_gauges = None
         self._recent.clear()
         self._measured_s = self._live_s = float("-inf")
-        self.calibration.set_connected(False)
+        self.calibration.set_device("")
         self.check.on_connected(None)
         self._update(device="", health=(), health_note=gettext(_NOT_CONNECTED))
+
+    def on_device_status(self, status: DeviceStatus) -> None:
+        """Samples come no longer, or again; an average of samples before and after is none."""
+        if status.stopped_at:
+            self._recent.clear()
+        for tab in (self.calibration, self.check):
+            tab.set_stopped(status.stopped_at)
+        self._update(stopped_at=status.stopped_at)
 
     def on_rows(self, rows: RingRows) -> None:
         self._recent.append(rows)

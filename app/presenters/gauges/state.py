@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 NAMES: Final = (N_("Gauge 1, table"), N_("Gauge 2, relative"))
 NO_DEVICE: Final = N_("No samples: connect the device first")
 CONNECTION_LOST: Final = N_("The connection is gone: the reading was not taken")
+DEVICE_LOST: Final = N_("No sample came after {time}: the reading was not taken")
+NO_SAMPLES: Final = N_("No sample has come since {time}: look at device and cable")
 
 
 class GaugesTab(StrEnum):
@@ -51,6 +53,8 @@ class GaugesState:
     device: str = ""
     health: "tuple[GaugeHealthState, ...]" = ()  # empty while nothing is known
     health_note: str = ""
+    stopped_at: str = ""
+    """Time of day of the last sample, if none comes any more; `health` is of then."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +144,8 @@ class CalibrationState:
     form: CalibrationForm = CalibrationForm()
     live_value: str = ""
     live_note: str = ""  # noise of the counts, or why there are none
+    stopped_at: str = ""
+    """Time of day of the last sample, if none comes any more; `live_value` is of then."""
     points: tuple[CalibrationPoint, ...] = ()
     reading_status: str = ""  # progress of the reading being averaged; empty while none is
     fit: CalibrationFit | None = None
@@ -185,6 +191,8 @@ class CheckState:
     form: CheckForm = CheckForm()
     is_started: bool = False  # whether a check is under way, which locks the form
     instruction: str = ""
+    stopped_at: str = ""
+    """Time of day of the last sample, if none comes any more."""
     reading_status: str = ""  # progress of the reading being averaged; empty while none is
     outcome: Chip = EMPTY_CHIP
     values: tuple[LabelledValue, ...] = ()

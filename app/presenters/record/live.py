@@ -14,7 +14,7 @@ from app.acquisition.messages import Health, LiveResult, PullbackState, StandPos
 from app.acquisition.pullback.plan import AllowedPlateRange
 from app.acquisition.ring import RingRows
 from app.presenters import number_text, results
-from app.presenters.base import Chip, Tone
+from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.decimated_history import DecimatedHistory, Polyline
 from app.presenters.record.state import LiveEstimate, LiveReadings, Span, TraceMarks, Traces
 from app.presenters.results import FRICTION, MAIN, PLATE_FRICTION
@@ -77,6 +77,8 @@ class LiveTraces:
     """Part of the shown time axis that is in view; None is all of it."""
     earlier: "LiveTraces | None" = None
     """An earlier run whose traces are shown until `restarted`."""
+    stopped_at: str = ""
+    """Time of day of the newest sample, where none comes any more."""
     read_s: float = float("-inf")
     traces: Traces = field(default_factory=Traces)
     readings: LiveReadings = field(default_factory=LiveReadings)
@@ -111,6 +113,13 @@ class LiveTraces:
     def stopped(self) -> "LiveTraces":
         """End the run with the newest sample, unless its end is known."""
         return self if self.end_s is not None else replace(self, end_s=self.samples.end_s)
+
+    def dated(self, stopped_at: str) -> "LiveTraces":
+        """Date what is shown by the time of day of the last sample; "" shows it as live again."""
+        dated = replace(self, stopped_at=stopped_at, readings=replace(self.readings, stopped_at=stopped_at))
+        if self.is_settled or self.release_s is not None:
+            return dated
+        return replace(dated, traces=replace(self.traces, time_title=dated._time_title()))
 
     def with_earlier(self, earlier: "LiveTraces") -> "LiveTraces":
         """Show traces of an earlier run until `restarted`."""
@@ -169,7 +178,8 @@ class LiveTraces:
 
     def _read(self, at_s: float) -> "LiveTraces":
         table, relative = (typeset(MILLIMETRE.number(m, 2)) for m in self.newest_m() - self.zero_m)
-        return replace(self, read_s=at_s, readings=LiveReadings(table, relative, self._origin()))
+        readings = LiveReadings(table, relative, self._origin(), self.stopped_at)
+        return replace(self, read_s=at_s, readings=readings)
 
     def _origin(self) -> str:
         if (self.zero_m != self.tare_m).any():
@@ -211,7 +221,7 @@ class LiveTraces:
             table=seen[0],
             relative=seen[1],
             span=span,
-            time_title=gettext("time from release, s") if is_released else gettext("time from now, s"),
+            time_title=self._time_title(),
             table_limit_mm=_limit_mm(table, pullback_m, marks.table_range_mm),
             relative_limit_mm=_limit_mm(relative, pullback_m, marks.relative_range_mm),
             marks=marks,
@@ -226,6 +236,13 @@ class LiveTraces:
             for line, zero_m in zip(lines, self.zero_m, strict=True)
         )
         return table, relative
+
+    def _time_title(self) -> str:
+        if self.release_s is not None:
+            return gettext("time from release, s")
+        if self.stopped_at:
+            return gettext("time from {time}, s", time=self.stopped_at)
+        return gettext("time from now, s")
 
     def _time_axis(self) -> tuple[float, Span]:
         now_s = self.samples.end_s if self.end_s is None else self.end_s
@@ -326,6 +343,8 @@ def lost_samples_chip(health: Health) -> Chip:
 
 def disk_chip(health: Health) -> Chip:
     free_bytes = health.free_disk_bytes
+    if free_bytes is None:
+        return EMPTY_CHIP
     text = gettext("{size} free", size=number_text.format_file_size(free_bytes))
     if health.bytes_per_s > 0.0:
         text += f", {_duration_text(free_bytes / health.bytes_per_s)}"
@@ -335,6 +354,13 @@ def disk_chip(health: Health) -> Chip:
     tone = Tone.WARN if free_bytes < DISK_SCARCE_BYTES else Tone.OK
     hint = gettext("Free space where runs are stored, and how long a recording it takes")
     return Chip(gettext("Disk {text}", text=text), tone, hint)
+
+
+def simulated_chip(is_simulated: bool) -> Chip:
+    if not is_simulated:
+        return EMPTY_CHIP
+    hint = gettext("Readings and runs are those of a simulated stand. Its runs are marked as simulated.")
+    return Chip(gettext("SIMULATED"), Tone.WARN, hint)
 
 
 def device_chip(name: str, loss_reason: str = "", silent_s: float = 0.0) -> Chip:

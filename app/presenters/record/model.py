@@ -189,6 +189,11 @@ class RecordModel:
         return self.stand.pullback_m(self.next_runs.series)
 
     @property
+    def shown_status_bar(self) -> StatusBar:
+        stopped_at = self.live.stopped_at
+        return self.status_bar.dated(stopped_at) if stopped_at else self.status_bar
+
+    @property
     def is_run_shown(self) -> bool:
         session = self.session
         is_active = session.is_recording or session.engine is PullbackState.CLOSING
@@ -204,7 +209,7 @@ class RecordModel:
         allowed = {Action.ARM} if session.is_idle else set()
         if self.ended is not None:
             allowed.add(Action.NEXT)
-        elif session.is_idle:
+        elif session.is_idle and not self.live.stopped_at:
             allowed.add(Action.TARE)
         if self.decisions.pending is not None:
             allowed |= {Action.DISCARD} | ({Action.REPEAT} if self._can_repeat else set())

@@ -102,7 +102,7 @@ class RecordPresenter(Presenter[state.RecordState]):
             self._execute(effect)
         is_drawn_only = self._model.live.read_s == before.live.read_s
         if isinstance(event, state.ClockTicked | RingRows) and is_drawn_only:
-            self._update(status_bar=self._model.status_bar, traces=self._model.live.traces)
+            self._update(status_bar=self._model.shown_status_bar, traces=self._model.live.traces)
         else:
             self._set_state(record_state(self._model))
 
@@ -156,7 +156,7 @@ def record_state(model: RecordModel) -> state.RecordState:
         cue=_cue(model) if model.sounds else None,
         choices=model.next_runs.choices,
         plan=model.next_runs.plan,
-        status_bar=model.status_bar,
+        status_bar=model.shown_status_bar,
         traces=model.live.traces,
         readings=model.live.readings,
         live_estimate=session.live_estimate,

@@ -11,6 +11,7 @@ from app.acquisition.ring import RingRows
 from app.presenters import results
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, SimulationStarted, Tone
+from app.presenters.device_status import DeviceStatus
 from app.presenters.record import live, state
 from app.presenters.record.model import (
     RECORDING_STATES,
@@ -96,6 +97,8 @@ class _Reduction:
                 self._set_session(simulated=False)
                 self._set(next_runs=model.next_runs.with_fixed_series("", ""))
                 self._start_over(None, "")
+            case DeviceStatus():
+                self._set(live=model.live.dated(event.stopped_at))
             case SimulationStarted(series, true_friction):
                 self._set_session(simulated=True, true_friction=true_friction)
                 hint = gettext("The simulated stand runs this series.")
@@ -115,7 +118,7 @@ class _Reduction:
         editable = not session.is_recording and not session.is_command_pending
         if editable is not model.next_runs.choices.editable:
             self._set(next_runs=model.next_runs.with_choices(editable=editable))
-        self._set_bar(run=self._run_chip())
+        self._set_bar(run=self._run_chip(), simulated=live.simulated_chip(session.simulated))
 
     # --- the operator ---
 
@@ -384,12 +387,13 @@ class _Reduction:
         self._set(status_bar=bar, monitors=monitors_of(gauges), live=traces)
 
     def _on_engine(self, event: engine.Event) -> None:
+        model = self.model
         self._set_session(heard_s=self.model.stand.clock())
         match event:
             case engine.StateChanged():
                 self._on_state(event)
-            case engine.Connected(device, _, rate_hz):
-                self._set_session(device=device)
+            case engine.Connected(device, _, rate_hz, simulated=is_simulated):
+                self._set_session(device=device, simulated=model.session.simulated or is_simulated)
                 self._set_bar(device=live.device_chip(device), rate=live.rate_text(rate_hz))
             case engine.Reconnecting(message):
                 self._set_loss(sentence(message))

@@ -1,6 +1,6 @@
 """State of the Record screen: what the view draws, tasks for its worker, and events that change it."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum, StrEnum, auto
 from typing import Any
 
@@ -9,6 +9,7 @@ from app.acquisition.ring import RingRows
 from app.presenters.analysed_run import AnalysedRun
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, SimulationStarted, Tone
 from app.presenters.decimated_history import Polyline
+from app.presenters.device_status import DeviceStatus
 from app.presenters.results import Result, ResultRow
 from app.runs.next_tests import NextTests
 from config.schema import Gauges, Settings
@@ -22,12 +23,25 @@ _DOTS_MAX = 6
 
 @dataclass(frozen=True, slots=True)
 class StatusBar:
+    """`stopped_at` is the time of day that rate, losses and gauges are of; empty while they are live."""
+
     device: Chip = _NO_DEVICE
     rate: str = ""
     lost_samples: Chip = EMPTY_CHIP
     gauges: tuple[Chip, ...] = ()
     disk: Chip = EMPTY_CHIP
     run: Chip = EMPTY_CHIP
+    stopped_at: str = ""
+    simulated: Chip = EMPTY_CHIP
+
+    def dated(self, stopped_at: str) -> "StatusBar":
+        """Status of a device whose samples have stopped."""
+        lost, gauges = _stale(self.lost_samples), tuple(map(_stale, self.gauges))
+        return replace(self, lost_samples=lost, gauges=gauges, stopped_at=stopped_at)
+
+
+def _stale(chip: Chip) -> Chip:
+    return replace(chip, tone=Tone.STALE)
 
 
 class StepStatus(StrEnum):
@@ -105,9 +119,12 @@ class Traces:
 
 @dataclass(frozen=True, slots=True)
 class LiveReadings:
+    """`stopped_at` as in `StatusBar`."""
+
     table: str = "–"
     relative: str = "–"
     origin: str = ""
+    stopped_at: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -370,6 +387,7 @@ RecordEvent = (
     | PlotResized
     | PlotZoomed
     | Connecting
+    | DeviceStatus
     | SimulationStarted
     | RingRows
     | ClockTicked

@@ -26,14 +26,14 @@ from app.presenters.gauges.state import (
     CalibrationPoint,
     CalibrationState,
 )
-from app.qt.theme import TextRole, Theme, colour
+from app.qt.theme import TextRole, Theme, colour, set_property
 from app.qt.widgets.inputs import CheckBox, make_button, make_choice, make_fields, show_texts
 from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row, make_scroll_area
 from app.qt.widgets.plot_curves import Points
 from app.qt.widgets.plot_marks import pen
 from app.qt.widgets.plots import PlotStack
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, show_chip
+from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, show_chip, stopped_chip
 from messages.i18n import N_, gettext
 
 _COLUMN_WIDTH = 256
@@ -126,6 +126,7 @@ class _ReadingColumn(QWidget):
         self._gauge.activated.connect(choose)
         self._live = label(role=TextRole.NUMBER)
         self._live.setAccessibleName(gettext("Counts now"))
+        self._stopped = label(wrap=True)
         self._spread = label(muted=True, wrap=True)
         self._message = label(wrap=True)
         self._dial = QLineEdit()
@@ -139,7 +140,7 @@ class _ReadingColumn(QWidget):
         self._restart = make_button(gettext("Start over"), presenter.restart, hint)
         self._table = _ReadingsTable()
         how = label(gettext(_HOW), muted=True, wrap=True)
-        texts = (self._live, self._spread, self._dial, self._waiting, self._message)
+        texts = (self._live, self._stopped, self._spread, self._dial, self._waiting, self._message)
         buttons = make_row(self._undo, self._restart, spacing=8)
         make_column(self._gauge, how, *texts, buttons, (self._table, 1), spacing=8, of=self)
 
@@ -147,6 +148,8 @@ class _ReadingColumn(QWidget):
         self._gauge.setCurrentIndex(state.form.gauge)
         self._gauge.setEnabled(not state.points and not state.reading_status)
         self._live.setText(state.live_value or "–")
+        set_property(self._live, "tone", "stale" if state.stopped_at else "plain")
+        show_chip(self._stopped, stopped_chip(state.stopped_at))
         self._spread.setText(state.live_note)
         show_chip(self._message, state.message)
         set_text_or_hide(self._waiting, state.reading_status)

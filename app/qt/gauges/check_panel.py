@@ -10,7 +10,7 @@ from app.qt.theme import TextRole
 from app.qt.widgets.inputs import make_button, make_choice, make_fields, show_texts
 from app.qt.widgets.layouts import STRETCH, make_column, make_form_grid, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, show_chip
+from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, show_chip, stopped_chip
 from messages.i18n import N_, gettext
 
 _HOW = N_(
@@ -38,6 +38,7 @@ class CheckPanel(QWidget):
         self._kind = make_choice({kind: kind.value for kind in CheckKind})
         self._fields = make_fields(_FIELDS, self._fill)
         self._instruction = label(role=TextRole.HEADING, wrap=True)
+        self._stopped = label(wrap=True)
         self._waiting = label(wrap=True)
         self._message = label(wrap=True)
         self._advance = make_button("", presenter.advance)
@@ -56,6 +57,7 @@ class CheckPanel(QWidget):
         head = (
             how,
             make_form_grid((*combos, *rows)),
+            self._stopped,
             self._instruction,
             self._waiting,
             make_row(*buttons, spacing=8),
@@ -74,6 +76,7 @@ class CheckPanel(QWidget):
         for part in (self._gauge, self._kind, *self._fields.values()):
             part.setEnabled(not state.is_started)
         set_text_or_hide(self._instruction, state.instruction)
+        show_chip(self._stopped, stopped_chip(state.stopped_at))
         set_text_or_hide(self._waiting, state.reading_status)
         self._advance.setText(gettext(_STARTED if state.is_started else _NOT_STARTED))
         is_due = bool(state.instruction) or not state.is_started

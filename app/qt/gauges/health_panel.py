@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from PySide6.QtWidgets import QStackedWidget, QWidget
@@ -17,7 +18,7 @@ from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.plot_marks import pen
 from app.qt.widgets.plots import PlotStack
-from app.qt.widgets.text import ValueGrid, label, show_chip
+from app.qt.widgets.text import ValueGrid, label, show_chip, stopped_chip
 from messages.i18n import N_, gettext
 
 _SYMPTOMS_SHOWN = 3
@@ -34,18 +35,19 @@ class HealthPanel(QStackedWidget):
 
     def __init__(self, theme: Theme, connect_device: Callable[[], None]) -> None:
         super().__init__()
-        self._shown: tuple[GaugeHealthState, ...] = ()
+        self._shown: tuple[tuple[GaugeHealthState, ...], str] = ((), "")
         self._words = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._go = make_button(gettext("Connect a device"), connect_device)
         self._go.setProperty("primary", "true")
         self._verdicts = (_Verdict(1), _Verdict(2))
+        self._stopped = label(role=TextRole.STRONG, wrap=True)
         self._facts = ValueGrid()
         self._spectrum = Spectrum(theme)
         empty, filled = QWidget(), QWidget()
         go = make_row(self._go, STRETCH)
         make_column(STRETCH, self._words, go, spacing=16, margins=(24, 24), of=empty).addStretch(2)
         verdicts = make_row(*((verdict, 1) for verdict in self._verdicts), spacing=16)
-        parts = (verdicts, self._facts, (self._spectrum, 1))
+        parts = (self._stopped, verdicts, self._facts, (self._spectrum, 1))
         make_column(*parts, spacing=8, margins=(16, 8), of=filled)
         self.addWidget(empty)
         self.addWidget(filled)
@@ -54,11 +56,12 @@ class HealthPanel(QStackedWidget):
         self._words.setText(state.health_note)
         self._go.setVisible(not state.device)
         self.setCurrentIndex(1 if state.health else 0)
-        if not state.health or state.health is self._shown:
+        show_chip(self._stopped, stopped_chip(state.stopped_at))
+        shown, self._shown = self._shown, (state.health, state.stopped_at)
+        if not state.health or (state.health is shown[0] and state.stopped_at == shown[1]):
             return
-        self._shown = state.health
         for verdict, card in zip(self._verdicts, state.health, strict=True):
-            verdict.show_card(card)
+            verdict.show_card(card, is_live=not state.stopped_at)
         self._facts.show_columns(
             (gettext("gauge 1"), gettext("gauge 2")), [card.figures for card in state.health]
         )
@@ -75,9 +78,10 @@ class _Verdict(QWidget):
         symptoms = [part for symptom in self._symptoms for part in symptom]
         make_column(self._name, self._verdict, *symptoms, STRETCH, spacing=4, of=self)
 
-    def show_card(self, card: GaugeHealthState) -> None:
+    def show_card(self, card: GaugeHealthState, *, is_live: bool) -> None:
         self._name.setText(gettext(card.name))
-        show_chip(self._verdict, _chip(card.verdict, gettext(_VERDICTS[card.verdict])))
+        verdict = _chip(card.verdict, gettext(_VERDICTS[card.verdict]))
+        show_chip(self._verdict, verdict if is_live else replace(verdict, tone=Tone.STALE))
         for number, (said, remedy) in enumerate(self._symptoms):
             symptom = card.symptoms[number] if number < len(card.symptoms) else None
             show_chip(said, _chip(symptom.grade, symptom.message) if symptom else EMPTY_CHIP)

@@ -86,7 +86,9 @@ class GuidancePanel(QWidget):
     def show_readings(self, readings: record.LiveReadings) -> None:
         for target, text in zip(self._readings, (readings.table, readings.relative), strict=True):
             target.value.setText(text)
-        self._origin.setText(readings.origin)
+            set_property(target.value, "tone", "stale" if readings.stopped_at else "plain")
+        at = gettext("at {time}", time=readings.stopped_at) if readings.stopped_at else ""
+        self._origin.setText(", ".join(filter(None, (at, readings.origin))))
 
 
 def _value_labels(count: int) -> list[ValueLabel]:

@@ -17,7 +17,7 @@ from app.qt.record.panels import DecisionPanel, GuidancePanel, ResultPanel
 from app.qt.record.plan_dialog import PlanDialog
 from app.qt.record.run_bar import RunBar
 from app.qt.record.sound import CuePlayer
-from app.qt.theme import TextRole, Theme
+from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button, set_button_hint
@@ -146,20 +146,28 @@ class StatusBarWidget(QFrame):
         self._device = label(role=TextRole.STRONG)
         self._rate, self._lost_samples, self._disk = label(), label(), label()
         self._gauges = (label(), label())
+        self._stopped = label(muted=True)
+        self._simulated = label(role=TextRole.STRONG)
         self._run = label(role=TextRole.STRONG)
         self._names = {self._device: "", self._run: ""}
-        left = (self._device, self._rate, self._lost_samples, *self._gauges)
+        lights = (self._rate, self._lost_samples, *self._gauges)
+        left = (self._simulated, self._device, *lights, self._stopped)
         self._row = make_row(*left, STRETCH, self._run, self._disk, margins=(_MARGIN, 8), of=self)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._device.setAccessibleName(gettext("Device"))
         self._rate.setAccessibleName(gettext("Measured sample rate"))
         self._lost_samples.setAccessibleName(gettext("Lost samples"))
+        self._stopped.setAccessibleName(gettext("Time of these values"))
         self._disk.setAccessibleName(gettext("Free disk space"))
         self._run.setAccessibleName(gettext("Run of its series"))
 
     def show_status(self, status: StatusBar) -> None:
         show_chip(self._device, replace(status.device, text=gettext(status.device.text)))  # "no device"
         set_text_or_hide(self._rate, status.rate)
+        set_property(self._rate, "tone", "stale" if status.stopped_at else "plain")
+        at = gettext("at {time}", time=status.stopped_at) if status.stopped_at else ""
+        set_text_or_hide(self._stopped, at)
+        show_chip(self._simulated, status.simulated)
         show_chip(self._run, status.run)
         show_chip(self._lost_samples, status.lost_samples)
         show_chip(self._disk, status.disk)

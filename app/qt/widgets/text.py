@@ -9,9 +9,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QTextDocumentFragment
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
-from app.presenters.base import Chip, LabelledValue
+from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Tone
 from app.presenters.results import ResultRow
 from app.qt.theme import TextRole, font, set_property
+from messages.i18n import gettext
 
 _Value = TypeVar("_Value")
 _Fill = TypeVar("_Fill")
@@ -45,6 +46,11 @@ def show_chip(target: QLabel, chip: Chip) -> None:
     target.setToolTip(chip.hint)
     target.setVisible(bool(chip.text))
     set_property(target, "tone", chip.tone.value)
+
+
+def stopped_chip(stopped_at: str) -> Chip:
+    """Chip above values of a device whose last sample came at this time of day; empty while it sends."""
+    return Chip(gettext("No samples since {time}", time=stopped_at), Tone.BAD) if stopped_at else EMPTY_CHIP
 
 
 def set_text_or_hide(target: QLabel, text: str) -> None:

@@ -14,6 +14,7 @@ from app.acquisition.averaged_counts import MAX_WINDOWS, NoAverageError, RecentS
 from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import LabelledValue, Progress, Tone
+from app.presenters.device_status import DeviceStatus
 from app.presenters.gauges.presenter import GaugesPresenter, gauge_cards
 from app.presenters.gauges.state import (
     NO_DEVICE,
@@ -79,9 +80,9 @@ class Desk:
     def last(self) -> Call:
         return self.worker.calls[-1]
 
-    def connect(self) -> None:
+    def connect(self, device: str = "GSV-8") -> None:
         self.presenter.on_connecting("COM7")
-        self.presenter.on_connected(Connected("GSV-8", "1.0", RATE_HZ, "/nowhere"))
+        self.presenter.on_connected(Connected(device, "1.0", RATE_HZ, "/nowhere"))
 
     def pass_time(self, seconds: float, **options: Any) -> None:
         """Samples come, a tenth of a second at a time."""
@@ -486,6 +487,110 @@ def test_a_check_needs_a_device_that_stays(desk: Desk) -> None:
     desk.presenter.on_disconnected()
     assert "connection is gone" in desk.presenter.check.state.message.text
     assert not desk.presenter.check.state.is_started
+
+
+# --- a device that is lost ---
+
+
+LOST = DeviceStatus("GSV-8", "14:03:21")
+LIVE = DeviceStatus("GSV-8")
+
+
+def test_a_lost_device_ends_an_average_and_dates_what_is_shown(desk: Desk) -> None:
+    desk.connect()
+    desk.presenter.enter()
+    desk.pass_time(2.0)
+    desk.work()
+    live = desk.presenter.calibration.state.live_value
+    desk.presenter.calibration.take_point("1")
+    desk.presenter.on_device_status(LOST)
+    calibration = desk.presenter.calibration.state
+    assert (calibration.live_value, calibration.stopped_at) == (live, "14:03:21")
+    assert calibration.reading_status == ""
+    assert calibration.message.text == "No sample came after 14:03:21: the reading was not taken"
+    assert desk.state.health != ()
+    assert desk.state.stopped_at == desk.presenter.check.state.stopped_at == "14:03:21"
+    desk.presenter.calibration.take_point("1")
+    assert "since 14:03:21" in desk.presenter.calibration.state.message.text
+    assert desk.presenter.calibration.state.reading_status == ""
+
+
+def test_samples_before_and_after_a_loss_are_not_averaged_together(desk: Desk) -> None:
+    desk.connect()
+    desk.presenter.enter()
+    desk.pass_time(1.0)
+    desk.presenter.on_device_status(LOST)
+    desk.presenter.on_device_status(LIVE)
+    assert desk.presenter.calibration.state.stopped_at == ""
+    desk.presenter.calibration.take_point("1")
+    assert desk.presenter.calibration.state.message.text == NO_DEVICE, "no sample has come since"
+    desk.pass_time(0.3)
+    desk.presenter.calibration.take_point("1")
+    desk.pass_time(1.3)
+    assert len(desk.presenter.calibration.state.points) == 1
+
+
+def test_a_calibration_is_not_saved_without_the_device_of_its_readings(desk: Desk) -> None:
+    desk.connect()
+    calibrate_by_hand(desk, [0.0, 2.5, 5.0])
+    calibration = desk.presenter.calibration
+    assert calibration.state.can_save
+    desk.presenter.on_device_status(LOST)
+    calibration.save()
+    assert desk.asked[-1] == "fit_calibration"
+    assert calibration.state.message.text.startswith("Not saved: GSV-8, which these readings are of, sends")
+    assert "readings-table-" in calibration.state.message.text
+    desk.presenter.on_disconnected()
+    calibration.save()
+    assert desk.asked[-1] == "fit_calibration"
+    desk.connect("HX711")
+    desk.presenter.on_device_status(DeviceStatus("HX711"))
+    calibration.save()
+    assert desk.asked[-1] == "fit_calibration"
+    desk.pass_time(1.0)
+    calibration.take_point("1")
+    assert calibration.state.message.text == (
+        "The readings before are of GSV-8: start over to calibrate with HX711"
+    )
+    desk.presenter.on_disconnected()
+    desk.connect()
+    calibration.save()
+    assert desk.asked[-1] == "save_calibration"
+
+
+def test_a_lost_device_breaks_a_check_off(desk: Desk) -> None:
+    desk.connect()
+    desk.presenter.enter()
+    desk.pass_time(0.5)
+    desk.presenter.check.set_form(check_form())
+    desk.presenter.check.advance()
+    desk.presenter.check.advance()
+    desk.pass_time(1.5)
+    assert "+10" in desk.presenter.check.state.instruction, "the reading at rest is taken"
+    desk.presenter.on_device_status(LOST)
+    assert desk.presenter.check.state.message.text == (
+        "No sample came after 14:03:21: the check is broken off, and nothing is kept"
+    )
+    assert not desk.presenter.check.state.is_started
+    desk.presenter.check.advance()
+    assert "since 14:03:21" in desk.presenter.check.state.message.text
+    assert not desk.presenter.check.state.is_started
+
+
+def test_a_check_whose_readings_are_taken_outlives_its_device(desk: Desk) -> None:
+    desk.presenter.set_tab(GaugesTab.CHECK)
+    desk.connect()
+    desk.presenter.enter()
+    desk.pass_time(0.5)
+    desk.presenter.check.set_form(check_form())
+    for table_m in (0.0, 10e-3):
+        desk.presenter.check.advance()
+        desk.presenter.check.advance()
+        desk.pass_time(1.5, table_m=table_m)
+    desk.presenter.on_device_status(LOST)
+    desk.presenter.on_disconnected()
+    desk.work()
+    assert desk.presenter.check.state.outcome.tone is Tone.OK
 
 
 def test_a_port_can_be_that_of_gauge_2(desk: Desk) -> None:

@@ -1,5 +1,7 @@
 """The Record presenter: what it shows and allows, from connecting to the result."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from stage import (
@@ -19,7 +21,8 @@ from stage import (
 )
 
 from app.acquisition.messages import Connected, EndReason, PullbackState, RunStarted, StateChanged
-from app.presenters.base import Chip, Progress, SimulationStarted, Tone
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, SimulationStarted, Tone
+from app.presenters.device_status import DeviceStatus
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import (
     Action,
@@ -324,6 +327,50 @@ def test_the_header_tells_rate_losses_and_disk(presenter: RecordPresenter) -> No
 def test_the_disk_tells_how_long_it_lasts(presenter: RecordPresenter, free_bytes: int, text: str) -> None:
     presenter.dispatch(health(free_disk_bytes=free_bytes, bytes_per_s=70_000.0))
     assert presenter.state.status_bar.disk.text == text
+
+
+def test_a_disk_whose_space_is_not_known_is_not_called_full(presenter: RecordPresenter) -> None:
+    presenter.dispatch(health(free_disk_bytes=None, bytes_per_s=70_000.0))
+    assert presenter.state.status_bar.disk == EMPTY_CHIP
+
+
+def test_what_a_lost_device_sent_last_is_grey_and_dated(
+    presenter: RecordPresenter, recorder: FakeRecorder
+) -> None:
+    presenter.dispatch(health())
+    feed(presenter, recorder, 0.0, 2.0)
+    live = presenter.state
+    assert Action.TARE in live.allowed
+    presenter.dispatch(DeviceStatus("GSV-8", "14:03:21"))
+    bar = presenter.state.status_bar
+    assert bar.stopped_at == "14:03:21"
+    assert [chip.text for chip in bar.gauges] == ["Gauge 1 ok", "Gauge 2 ok"]
+    assert {chip.tone for chip in (bar.lost_samples, *bar.gauges)} == {Tone.STALE}
+    assert bar.disk.tone is Tone.OK, "it is read from the disk"
+    assert presenter.state.readings == replace(live.readings, stopped_at="14:03:21")
+    assert presenter.state.traces.time_title == "time from 14:03:21, s"
+    assert Action.TARE not in presenter.state.allowed, "nothing is read any more"
+    presenter.tick()
+    assert presenter.state.status_bar == bar
+    presenter.dispatch(DeviceStatus("GSV-8"))
+    feed(presenter, recorder, 2.0, 3.0)
+    assert presenter.state.status_bar.stopped_at == presenter.state.readings.stopped_at == ""
+    assert {chip.tone for chip in presenter.state.status_bar.gauges} == {Tone.OK}
+    assert presenter.state.traces.time_title == "time from now, s"
+
+
+def test_a_simulated_device_is_named_in_the_header_until_another_is_connected(
+    recorder: FakeRecorder,
+) -> None:
+    presenter = make(recorder)
+    presenter.dispatch(Connecting("COM7"))
+    presenter.dispatch(Connected("slipstand-fw", "simulated-1", 1000.0, "/ring", simulated=True))
+    assert presenter.state.status_bar.simulated.text == "SIMULATED"
+    presenter.dispatch(Notification.DISCONNECTED)
+    assert presenter.state.status_bar.simulated.text == ""
+    presenter.dispatch(Connecting("COM7"))
+    presenter.dispatch(Connected("GSV-8", "1.45", 1000.0, "/ring"))
+    assert presenter.state.status_bar.simulated.text == ""
 
 
 def test_an_overload_is_said_while_it_lasts_and_a_second_longer(

@@ -1,5 +1,6 @@
 """The window presenter from the start page to the result, with fake engine and workers."""
 
+import datetime
 import time
 from collections.abc import Iterator
 
@@ -19,9 +20,17 @@ from stage import (
     standing,
 )
 
-from app.acquisition.messages import EndReason, Failed, PortSettings, StateChanged
+from app.acquisition.messages import (
+    EndReason,
+    Failed,
+    PortSettings,
+    Reconnected,
+    Reconnecting,
+    StateChanged,
+)
 from app.presenters.base import NoticeAction, Progress, Tone
 from app.presenters.connection import Connection
+from app.presenters.device_status import DeviceMonitor
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import Action
@@ -32,13 +41,18 @@ from app.presenters.window import WindowContext, WindowPresenter
 from config.files import load_gauges
 
 
+NOON = datetime.datetime(2026, 2, 1, 12, 0)
+
+
 class Desk:
     """A window presenter with everything around it."""
 
     def __init__(self, personal: PersonalSettings | None = None) -> None:
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
-        self.session = Connection(*self.launcher.starters, ErrorReporter().report)
+        self.now_s = 0.0
+        monitor = DeviceMonitor(lambda: self.now_s, lambda: NOON + datetime.timedelta(seconds=self.now_s))
+        self.session = Connection(*self.launcher.starters, ErrorReporter().report, monitor)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,
@@ -136,6 +150,34 @@ def test_a_lost_device_is_said_with_a_way_back(desk: Desk) -> None:
     desk.tick_until_connected()
     assert window.state.notice is None
     assert desk.launcher.ports == [port, port]
+
+
+def test_every_screen_dates_what_a_lost_device_sent_last(desk: Desk) -> None:
+    window = desk.window
+    window.open_port(PortSettings("COM7", "csv"))
+    desk.tick_until_connected()
+    desk.now_s = 21.0
+    desk.play(2.0)
+
+    def shown() -> set[str]:
+        states = window.record.state.status_bar, window.record.state.readings, window.gauges.state
+        tabs = window.gauges.calibration.state, window.gauges.check.state
+        return {state.stopped_at for state in (*states, *tabs, window.start.state)}
+
+    assert shown() == {""}
+    desk.now_s = 30.0
+    desk.launcher.engines[-1].say(Reconnecting("COM7 is gone"))
+    window.tick()
+    assert shown() == {"12:00:21"}
+    desk.launcher.engines[-1].say(Reconnected(9.0, "back"))
+    desk.play(3.0)
+    assert shown() == {""}
+    desk.now_s = 33.0
+    window.tick()
+    assert shown() == {"12:00:30"}, "silence, without a word of the engine"
+    window.close_connection()
+    window.tick()
+    assert shown() == {""}
 
 
 def test_a_run_that_ended_badly_is_said_and_still_identified(desk: Desk) -> None:
