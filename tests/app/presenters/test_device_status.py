@@ -8,7 +8,7 @@ from ring_kit import ring_rows
 from app.acquisition.messages import Connected, Failed, Reconnected, Reconnecting
 from app.presenters.device_status import SILENT_S, DeviceMonitor, DeviceStatus
 
-BEGIN = datetime.datetime(2026, 2, 1, 14, 3, 0)
+BEGIN = datetime.datetime(2026, 2, 1, 14, 3, tzinfo=datetime.UTC)
 
 
 class Clock:

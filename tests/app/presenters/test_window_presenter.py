@@ -40,8 +40,7 @@ from app.presenters.start_screen import StartState
 from app.presenters.window import WindowContext, WindowPresenter
 from config.files import load_gauges
 
-
-NOON = datetime.datetime(2026, 2, 1, 12, 0)
+NOON = datetime.datetime(2026, 2, 1, 12, tzinfo=datetime.UTC)
 
 
 class Desk:
