@@ -100,7 +100,18 @@ class ClockFit:
         """Rate until now; None before there are 8 windows of 0.1 s."""
         if len(self._earliest) < _MIN_WINDOWS:
             return None
-        line = fit_robust_line(*np.array(list(self._earliest.values())).T)
+        return self._estimate(np.array(list(self._earliest.values())))
+
+    def halves(self) -> tuple[ClockEstimate, ClockEstimate] | None:
+        """Rate in the first and in the second half of the windows; None as for `estimate`."""
+        if len(self._earliest) < _MIN_WINDOWS:
+            return None
+        points = np.array(list(self._earliest.values()))
+        middle = len(points) // 2
+        return self._estimate(points[:middle]), self._estimate(points[middle:])
+
+    def _estimate(self, points: Floats) -> ClockEstimate:
+        line = fit_robust_line(*points.T)
         scale = 1 + line.slope
         uncertainty = math.hypot(line.slope_uncertainty, DELIVERY_UNCERTAINTY_S / line.span)
         return ClockEstimate(1 / (self._period_s * scale), scale, uncertainty, line.span)

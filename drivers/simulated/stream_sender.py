@@ -110,6 +110,9 @@ class StreamSender:
     _STEP_S = 0.001
     _CATCH_UP = 1.25
     """A late stream is sent so many times as fast; real devices never send much faster than their rate."""
+    _BURST_LEAST = 64
+    """Samples that may be sent at once at any rate, some kB: a process that gets the processor each 30 ms
+    keeps pace at 2 kHz, and does not look like a device of a lower rate."""
 
     def __init__(
         self, output: WireOutput, signal: Signal, clock: DeviceClock, log: TransmissionLog, started_ns: int
@@ -120,7 +123,8 @@ class StreamSender:
         self._log = log
         self._started_ns = started_ns
         self._n = output.protocol.samples_per_frame(log.rate_hz)
-        self._burst = math.ceil(output.transport.burst_s * log.true_rate_hz / self._n)
+        burst = max(output.transport.burst_s * log.true_rate_hz, self._BURST_LEAST)
+        self._burst = math.ceil(burst / self._n)
         self._allowed = float(self._burst)
         self._stepped_ns = started_ns
 

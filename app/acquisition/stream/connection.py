@@ -127,10 +127,16 @@ class PortOpener:
 
 
 class Connection:
-    """A device that is being read. `first` is the part of its stream that was read before."""
+    """A device that is being read, of a port opened at `opened_ns`.
 
-    def __init__(self, port: OpenPort, source: SampleSource, first: bytes, read_queue: ReadQueue) -> None:
+    `first` is the part of its stream that was read before.
+    """
+
+    def __init__(
+        self, port: OpenPort, source: SampleSource, first: bytes, read_queue: ReadQueue, opened_ns: int
+    ) -> None:
         self.port = port
+        self.opened_ns = opened_ns
         self.start_ns = host_ns()
         self.last_poll_ns = self.start_ns
         """Host's time when the port was looked at the last time, whether anything came or not."""
@@ -226,11 +232,12 @@ class Reconnection:
             self._stopping.wait(_OFTEN_S if host_ns() - self._began_ns < _OFTEN_UNTIL_S * 1e9 else _SELDOM_S)
 
     def _attempt(self) -> Connection:
+        opened_ns = host_ns()
         port = self._open_port()
         try:
             first = self._source.resume(CancellableLink(port, self._stopping))
             self._queue.put(host_ns(), b"")
-            return Connection(port, self._source, first, self._queue)
+            return Connection(port, self._source, first, self._queue, opened_ns)
         except BaseException:
             port.close()
             raise

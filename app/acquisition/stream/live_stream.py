@@ -23,7 +23,7 @@ from app.runs.blocks import CalibratedBlock, calibrate
 from config.schema import Gauges
 from drivers.clock import ClockEstimate, TimeBase
 from drivers.errors import DriverError, NoDataError
-from drivers.host_time import HostMonitor
+from drivers.host_time import HostMonitor, host_ns
 from drivers.packets import MAX_BLOCK_ROWS
 from drivers.port import OpenPort
 from drivers.samples import ChannelFilter, DeviceIdentity, Losses
@@ -143,7 +143,7 @@ class LiveStream:
         self._lost = StreamFault(EndReason.DEVICE_LOST, EMPTY)
         self._search_failure = EMPTY
         self._stall_detector = StallDetector(self._port.device, source, connection.start_ns)
-        self._rate_monitor = RateMonitor(source.rate_hz)
+        self._rate_monitor = RateMonitor(source.rate_hz, connection.opened_ns)
         self._host = HostMonitor()
         self._events: deque[StreamEvent] = deque()
 
@@ -301,9 +301,10 @@ def open_stream(settings: PortSettings, gauges: Gauges) -> LiveStream:
     source = create_source(settings, settings.rate_hz)
     opener = PortOpener(settings, source)
     source.prepare()
+    opened_ns = host_ns()
     port, read_queue = opener.open(), ReadQueue()
     try:
-        connection = Connection(port, source, source.start(port), read_queue)
+        connection = Connection(port, source, source.start(port), read_queue, opened_ns)
     except BaseException:
         port.close()
         raise

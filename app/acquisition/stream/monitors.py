@@ -1,6 +1,8 @@
 """Monitors of a stream: its true rate, and whether it has stalled."""
 
 import math
+from collections import deque
+from itertools import pairwise, starmap
 
 from drivers.clock import ClockEstimate, ClockFit, TimeBase
 from drivers.host_time import host_ns
@@ -24,36 +26,51 @@ _HOLE_SAMPLES = 5.0
 """While nothing was read for so long, the host or the device stood still: the window around it is dropped."""
 _HOLES_FRACTION = 0.1  # a stream with more of such holes gives no rate: most of it may have come late
 _SETTLING_S = 0.5  # what comes first was held while the device was started: its arrival times are not used
+_WINDOWS = 3
+"""Successive windows that must agree on a wrong rate; on a busy host, windows differ."""
+_BEHIND_S = 0.3  # delays of host, port and adapter change by less
+_AHEAD_S = 0.1
 
 
 class RateMonitor:
-    """Times a stream of nominally `rate_hz` by the host's clock: as a whole, and in its latest window."""
+    """Times a stream of nominally `rate_hz` by the host's clock: as a whole, and in its latest window.
 
-    def __init__(self, rate_hz: float) -> None:
+    `opened_ns` is the host's time when the port was opened: no sample was taken before. A sample comes late,
+    never early, so a stream whose samples come quicker than at its rate catches up, unless they come before
+    they could have been taken at that rate.
+    """
+
+    def __init__(self, rate_hz: float, opened_ns: int) -> None:
         self._rate_hz = rate_hz
+        self._begun: tuple[int, int] | None = (0, opened_ns)
+        """A sample, and a time at which it was not taken yet; None after a restart of the device."""
         self._hole_ns = max(_HOLE_S, _HOLE_SAMPLES / rate_hz) * 1e9
-        self._longest: ClockEstimate | None = None
+        self._known: ClockEstimate | None = None
         self._recent: ClockEstimate | None = None
         self._recent_ns = self._latest_ns = 0
         self._is_wrong = False
-        self._before: ClockEstimate | None = None
         self._first_ns: int | None = None
         self._begin()
 
     def restart(self) -> None:
-        self._longest = self.estimate()
+        self.estimate()
+        self._begun = None
         self._begin()
 
     def estimate(self) -> ClockEstimate | None:
-        """Clock of the device by the longest stretch without a gap; None if that is too short."""
+        """Clock of the device by the longest stretch without a gap; None if that is too short.
+
+        An estimate stays while a later one, of samples that came late meanwhile, is less certain and agrees.
+        """
         present = self._whole.estimate()
         if (
-            present is None
-            or self._holes_ns * 1e-9 > _HOLES_FRACTION * present.span_s
-            or (self._longest is not None and self._longest.span_s > present.span_s)
+            present is not None
+            and self._is_known(present)
+            and self._holes_ns * 1e-9 <= _HOLES_FRACTION * present.span_s
+            and (self._known is None or _is_better(present, self._known))
         ):
-            return self._longest
-        return present
+            self._known = present
+        return self._known
 
     def recent(self) -> ClockEstimate | None:
         """As `estimate`, but up to a second old, because an estimate costs much."""
@@ -64,6 +81,7 @@ class RateMonitor:
     def add(self, index: int, arrival_ns: int) -> Message:
         """Take the last sample of a read; return a note when the rate has become wrong, else EMPTY."""
         before_ns, self._latest_ns = self._latest_ns, arrival_ns
+        self._follow_delay(index, before_ns)
         if self._first_ns is None:
             self._first_ns = self._window_ns = arrival_ns
         if arrival_ns - self._first_ns < _SETTLING_S * 1e9:
@@ -71,7 +89,7 @@ class RateMonitor:
         self._whole.add(index, arrival_ns)
         if arrival_ns - before_ns > self._hole_ns:
             self._holes_ns += arrival_ns - before_ns
-            self._before = None
+            self._windows.clear()
             self._begin_window(arrival_ns)
         self._window.add(index, arrival_ns)
         if arrival_ns - self._window_ns < _WINDOW_S * 1e9:
@@ -80,23 +98,47 @@ class RateMonitor:
 
     def _begin(self) -> None:
         self._whole, self._window = ClockFit(self._rate_hz), ClockFit(self._rate_hz)
-        self._before = None
+        self._windows = deque[ClockEstimate](maxlen=_WINDOWS)
         self._first_ns = None
+        self._delay_s, self._least_delay_s = 0.0, math.inf
         self._window_ns = self._holes_ns = 0
 
     def _begin_window(self, arrival_ns: int) -> None:
         self._window, self._window_ns = ClockFit(self._rate_hz), arrival_ns
 
     def _check_window(self, arrival_ns: int) -> Message:
-        """A wrong rate is as wrong as in the window before; on a busy host, windows differ."""
-        latest, before = self._window.estimate(), self._before
-        self._before = latest
+        """A wrong rate is as wrong as in the windows before."""
+        latest = self._window.estimate()
         self._begin_window(arrival_ns)
+        if latest is None:
+            self._windows.clear()
+            return EMPTY
+        self._windows.append(latest)
         was_wrong = self._is_wrong
-        self._is_wrong = latest is not None and before is not None and _agree_on_wrong(latest, before)
-        return (
-            rate_note(latest.scale, self._rate_hz) if latest and self._is_wrong and not was_wrong else EMPTY
-        )
+        is_same = len(self._windows) == _WINDOWS and all(starmap(_agree_on_wrong, pairwise(self._windows)))
+        self._is_wrong = is_same and self._is_no_delay(latest)
+        return rate_note(latest.scale, self._rate_hz) if self._is_wrong and not was_wrong else EMPTY
+
+    def _follow_delay(self, index: int, before_ns: int) -> None:
+        """Measure how much later the newest sample came than it was due at the nominal rate."""
+        if self._begun is None:
+            self._begun = (index, before_ns)
+        first, begun_ns = self._begun
+        self._delay_s = (self._latest_ns - begun_ns) * 1e-9 - (index - first) / self._rate_hz
+        self._least_delay_s = min(self._least_delay_s, self._delay_s)
+
+    def _is_no_delay(self, estimate: ClockEstimate) -> bool:
+        """Tell whether a wrong rate is more than samples that come later and later, or catch up."""
+        if estimate.scale < 1.0:
+            return self._delay_s < -_AHEAD_S
+        return self._delay_s - self._least_delay_s > _BEHIND_S
+
+    def _is_known(self, whole: ClockEstimate) -> bool:
+        """Tell whether the rate of the whole stretch is that of the device: of a wrong one, throughout it."""
+        if abs(whole.scale - 1.0) < _WRONG:
+            return True
+        halves = self._whole.halves()
+        return self._is_no_delay(whole) and halves is not None and _agree(*halves)
 
 
 def is_rate_wrong(estimate: ClockEstimate | TimeBase) -> bool:
@@ -104,13 +146,20 @@ def is_rate_wrong(estimate: ClockEstimate | TimeBase) -> bool:
     return abs(estimate.scale - 1.0) >= max(_WRONG, _WRONG_ERRORS * estimate.scale_standard_uncertainty)
 
 
+def _is_better(present: ClockEstimate, known: ClockEstimate) -> bool:
+    is_as_certain = present.scale_standard_uncertainty <= known.scale_standard_uncertainty
+    uncertainty = math.hypot(present.scale_standard_uncertainty, known.scale_standard_uncertainty)
+    contradicts = abs(present.scale - known.scale) > 2.0 * uncertainty
+    return present.span_s >= known.span_s and (is_as_certain or contradicts)
+
+
 def _agree_on_wrong(one: ClockEstimate, other: ClockEstimate) -> bool:
+    return is_rate_wrong(one) and is_rate_wrong(other) and _agree(one, other)
+
+
+def _agree(one: ClockEstimate, other: ClockEstimate) -> bool:
     uncertainty = math.hypot(one.scale_standard_uncertainty, other.scale_standard_uncertainty)
-    return (
-        is_rate_wrong(one)
-        and is_rate_wrong(other)
-        and abs(one.scale - other.scale) <= max(_WRONG, 2.0 * uncertainty)
-    )
+    return abs(one.scale - other.scale) <= max(_WRONG, 2.0 * uncertainty)
 
 
 def rate_note(scale: float, nominal_hz: float) -> Message:

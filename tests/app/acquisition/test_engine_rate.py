@@ -36,14 +36,18 @@ class Owner:
 
     is_closed = False
 
-    def __init__(self, intake: ReadQueue, folder: Path, began_ns: int, quicker: float) -> None:
+    def __init__(
+        self, intake: ReadQueue, folder: Path, began_ns: int, quicker: float, late_s: float = 0.0
+    ) -> None:
         run = RunSettings(
             str(folder), series="1FFM0", trigger="none", pretrigger_s=PRETRIGGER_S, duration_s=DURATION_S
         )
         self._commands = [Arm(run, 1)]
         self._intake = intake
         late_ns = np.random.default_rng(1).exponential(LATE_S * 1e9, ALL_READS)
-        self._arrivals_ns = began_ns + np.arange(1, ALL_READS + 1) * READ_NS / quicker + late_ns
+        taken_ns = np.arange(1, ALL_READS + 1) * READ_NS / quicker
+        behind_ns = np.maximum(0.0, late_s * 1e9 - 0.2 * taken_ns)
+        self._arrivals_ns = began_ns + taken_ns + behind_ns + late_ns
         self._reads = 0
         self.ended: RunEnded | None = None
 
@@ -61,20 +65,33 @@ class Owner:
             self._commands.append(Quit())
 
 
-@pytest.mark.parametrize("quicker", [1.0, 1.2, 0.7])
-def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quicker):
+def record(tmp_path: Path, quicker: float, late_s: float = 0.0) -> RunEnded:
     source, intake = make_source({}, RATE_HZ), ReadQueue()
     source.prepare()
     connection = HeardConnection()
-    owner = Owner(intake, tmp_path, connection.start_ns, quicker)
+    owner = Owner(intake, tmp_path, connection.start_ns, quicker, late_s)
     with create_ring(tmp_path / "live.ring", 1 << 12, RATE_HZ, load_gauges()) as ring:
         stream = LiveStream(connection, source, intake, load_gauges(), None)
         connect = Connect(PortSettings("fake://", "slipstand-binary"), "", "")
         Engine(connect, load_stand(), load_gauges(), stream, ring, owner, owner).run()
     assert owner.ended is not None
-    assert ("instead of 100" in str(owner.ended.message)) == (quicker != 1.0), owner.ended.message
-    ending = open_run(owner.ended.path).end
+    return owner.ended
+
+
+@pytest.mark.parametrize("quicker", [1.0, 1.2, 0.7])
+def test_a_wrong_rate_is_said_and_kept_as_the_scale_of_the_clock(tmp_path, quicker):
+    ended = record(tmp_path, quicker)
+    assert ("instead of 100" in str(ended.message)) == (quicker != 1.0), ended.message
+    ending = open_run(ended.path).end
     assert 0.0 < ending.time_base.scale_standard_uncertainty < 1e-3
     assert ending.time_base.scale == pytest.approx(
         1 / quicker, abs=5 * ending.time_base.scale_standard_uncertainty
     )
+
+
+@pytest.mark.parametrize("late_s", [1.0, 3.0])
+def test_a_short_run_of_a_device_that_catches_up_has_no_wrong_rate(tmp_path, late_s):
+    ended = record(tmp_path, 1.0, late_s)
+    assert "instead of" not in str(ended.message)
+    ending = open_run(ended.path).end
+    assert ending.time_base.scale == pytest.approx(1.0, abs=1e-3)

@@ -110,7 +110,7 @@ class Listener:
     def __init__(self, device: Device) -> None:
         source = make_source({}, RATE_HZ)
         wire, intake = device.open(), ReadQueue()
-        connection = Connection(wire, source, source.start(wire), intake)
+        connection = Connection(wire, source, source.start(wire), intake, host_ns())
         self.stream = LiveStream(connection, source, intake, load_gauges(), device.open)
         self.chunks = []
         self.news = []

@@ -52,7 +52,7 @@ class Connection:
     ended = None
 
     def __init__(self) -> None:
-        self.start_ns = host_ns()  # of now: what came minutes ago would be called silence
+        self.opened_ns = self.start_ns = host_ns()  # of now: what came minutes ago would be called silence
         self.last_poll_ns = self.start_ns + 10**15
 
     def close(self, *, stop_device: bool = False) -> None: ...

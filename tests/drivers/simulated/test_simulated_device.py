@@ -61,6 +61,14 @@ def test_a_stall_is_caught_up_in_pieces_that_a_port_can_hold_and_a_reader_bear()
     assert 1.2 * 0.2 * 100_000 < device.log.samples - before < 1.3 * 0.2 * 100_000
 
 
+def test_a_process_that_gets_its_turn_seldom_keeps_the_rate_of_its_device():
+    wire = Wire()
+    device = start(wire, DeviceSetup(1000.0))
+    for now_ns in range(0, 3_000_000_001, 30_000_000):
+        device.step(now_ns)
+    assert device.log.samples >= 3000 - 64
+
+
 def test_obeys_the_commands_of_the_firmware():
     wire = Wire()
     device = SimulatedDevice(wire, SimulatedBinary(), ramp_at, DeviceSetup(2000.0))
