@@ -5,6 +5,7 @@ ends, the owner is gone: a run that needs nobody goes on to its end, any other i
 stored, and the process ends.
 """
 
+import datetime
 import logging
 import signal
 import sys
@@ -26,6 +27,7 @@ from app.acquisition.stream import live_stream
 from app.child_process import CommandReader, EventSender, LineDecoder, ignore_session_signals, reserve_stdout
 from app.log import start_log
 from app.runs.errors import RunError
+from app.runs.unattended import UnattendedRun, leave_note
 from app.runs.writer_client import WriterClient
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError, Gauges, Stand
@@ -286,8 +288,17 @@ class Engine:
         self._events.send(ended)
         if following is None or not self._try_to_arm(following):
             self._sleep_prevention.end()
+        if self._commands.is_closed and not self._is_asked_to_quit:
+            self._leave_note(recording, ended)
         if following is None:
             self._send_idle()
+
+    def _leave_note(self, recording: Recording, ended: messages.RunEnded) -> None:
+        """The owner is gone: tell the next one."""
+        now = datetime.datetime.now().astimezone()
+        series = recording.metadata.series or ""
+        run = UnattendedRun(recording.directory, ended.ended, now, ended.path, series, ended.message)
+        leave_note(run)
 
     def _follow_live(self, recording: Recording) -> None:
         now_s = self._history.next_index / self._rate_hz

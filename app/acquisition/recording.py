@@ -4,6 +4,7 @@ import contextlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
+from pathlib import Path
 
 import msgspec
 
@@ -92,6 +93,11 @@ class Recording:
         self._send_state(self._state, self._armed_index, self._trigger.note)
         if self._trigger.state is not self._state:  # the second before was rest enough
             self._send_state(self._trigger.state, self._armed_index, self._trigger.note)
+
+    @property
+    def directory(self) -> str:
+        """Folder of the runs."""
+        return str(Path(self._settings.directory).absolute())
 
     @property
     def is_unattended(self) -> bool:

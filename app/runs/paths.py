@@ -14,10 +14,15 @@ from config.schema import Settings
 RECORDINGS = "SLIPSTAND_RECORDINGS"  # variable that says where runs are kept, before all settings
 
 
+def user_data_folder() -> Path:
+    """Folder of what the program keeps for a user beside runs and settings; it need not exist."""
+    return platformdirs.user_data_path("Slipstand", appauthor=False)
+
+
 def journal_fallback_folders() -> list[Path]:
     """Folders that a journal moves to when the folder of its run fails: data folder, then temporary files."""
     return [
-        platformdirs.user_data_path("Slipstand", appauthor=False) / "journals",
+        user_data_folder() / "journals",
         Path(tempfile.gettempdir()) / f"slipstand-journals-{getpass.getuser()}",
     ]
 

@@ -42,6 +42,14 @@ def cache_folder(tmp_path_factory, monkeypatch):
     return place
 
 
+@pytest.fixture(autouse=True)
+def data_folder(tmp_path_factory, monkeypatch):
+    """A data folder of the test's own on Linux, for the processes that it starts too."""
+    place = tmp_path_factory.mktemp("data")
+    monkeypatch.setenv("XDG_DATA_HOME", str(place))
+    return place
+
+
 @pytest.fixture(scope="session")
 def short_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     """Two short synthetic runs of two series, not to be changed."""

@@ -35,6 +35,7 @@ from app.acquisition.messages import (
     Stop,
 )
 from app.runs.reader import open_run
+from app.runs.unattended import read_notes
 from app.simulated_stand.options import Gesture
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
@@ -185,6 +186,16 @@ def test_when_its_owner_is_killed_the_run_is_finished_and_stored(tmp_path, share
     assert run.end.ended == ended
     assert len(run) == 2500 or ended == "interrupted"
     assert gone(engine_id)
+    (note,) = read_notes(tmp_path).values()
+    assert (note.path, note.ended, note.series) == (str(run.path), ended, "1FFM0")
+
+
+def test_a_run_whose_owner_quits_needs_no_note(tmp_path, shared):
+    with connect(port_of(shared)) as engine:
+        engine.send(Arm(run_in(tmp_path, trigger="none", duration_s=60.0)))
+        until(engine, RunStarted)
+    assert closed_run(tmp_path).end.ended == "stopped"
+    assert read_notes(tmp_path) == {}
 
 
 RECORDER = """
