@@ -92,13 +92,15 @@ class NoticeAction(Enum):
     RECOVER = N_("Recover")
     CLOSE = N_("Close the window")
     SIMULATE = N_("Start the simulated stand")
+    OPEN_RUN = N_("Look at it")
 
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """Message above the screen, shown until it is dismissed; `details` can be unfolded and copied.
+    """Message above the screen, shown until it is dismissed or what it tells of is over.
 
-    A question is answered by its action, or by its dismissal, which leaves all as it is.
+    A question is answered by its action, or by its dismissal, which leaves all as it is. `details` can be
+    unfolded and copied; `path` is the run that the action opens.
     """
 
     text: str
@@ -107,6 +109,7 @@ class Notice:
     dismiss: str = N_("Dismiss")
     details: str = ""
     is_question: bool = False
+    path: str = ""
 
 
 @dataclass(frozen=True, slots=True)

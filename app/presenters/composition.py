@@ -10,12 +10,14 @@ from app.acquisition.messages import PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.navigator import ConnectForm, StandContext
+from app.presenters.notices import NoticeSources
 from app.presenters.settings_screen import PersonalSettings, SettingsFile
 from app.presenters.start_screen import PortChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter
 from app.presenters.worker import Worker, WorkerPool
 from app.runs.journal import unfinished_journals
 from app.runs.paths import RECORDINGS, journal_folders, recordings_directory
+from app.runs.unattended import read_notes
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config import files
@@ -65,10 +67,17 @@ def make_window_presenter(
             personal,
             simulation,
             _list_ports,
-            lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(context.directory)),
+            _notice_sources(context.directory),
         ),
         errors,
     )
+
+
+def _notice_sources(directory: Path) -> NoticeSources:
+    def count_unfinished() -> int:
+        return sum(len(unfinished_journals(folder)) for folder in journal_folders(directory))
+
+    return NoticeSources(count_unfinished, partial(read_notes, directory))
 
 
 def _save(settings: Settings) -> Path | None:

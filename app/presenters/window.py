@@ -26,6 +26,7 @@ from app.presenters.error_reports import ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.navigator import ConnectForm, StandContext
+from app.presenters.notices import NoticeCause, NoticeList, NoticeSources
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import AnalysisFailed, AnalysisProgress, Connecting, Notification
 from app.presenters.recovery import RecoveryReport
@@ -40,7 +41,6 @@ from app.presenters.worker import LazyModule, Worker, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
 from config.schema import Gauges, Settings
 from messages.i18n import N_, gettext
-from messages.message import Message
 
 if TYPE_CHECKING:
     from app.presenters import analysis_task
@@ -54,6 +54,7 @@ class WindowState:
 
     screen: Screen = Screen.START
     notice: Notice | None = None
+    more_notices: int = 0  # that wait behind it
     theme: str = "system"
     is_closing: bool = False
 
@@ -65,8 +66,7 @@ class WindowContext:
     personal: PersonalSettings = field(default_factory=PersonalSettings)
     simulation: SimulatedStandOptions = field(default_factory=SimulatedStandOptions)
     list_ports: Callable[[], tuple[PortChoice, ...]] = tuple
-    count_unfinished: Callable[[], int] = lambda: 0
-    """Number of runs in the folder that a crash has left unfinished."""
+    notices: NoticeSources = field(default_factory=NoticeSources)
 
 
 class WindowPresenter(Presenter[WindowState]):
@@ -89,7 +89,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._connection = connection
         self._analysis = analysis
         self._pool = pool
-        self._count_unfinished = context.count_unfinished
+        self._notices = NoticeList(context.notices, self._show_notice)
         self._folder = str(context.stand.directory)
         self._open_again: Callable[[], None] | None = None
         self._open_stand_instead: Callable[[], None] | None = None
@@ -114,7 +114,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._apply_settings(context.personal.settings)
         if context.personal.fault:
             text = gettext("{fault}. The usual settings are used until then", fault=context.personal.fault)
-            self._update(notice=Notice(sentence(text), Tone.WARN))
+            self._notices.put(NoticeCause.SETTINGS, Notice(sentence(text), Tone.WARN))
 
     def show_screen(self, screen: Screen) -> None:
         before, entered = self.presenters[self.state.screen], self.presenters[screen]
@@ -124,12 +124,11 @@ class WindowPresenter(Presenter[WindowState]):
         self._update(screen=screen)
 
     def dismiss_notice(self) -> None:
-        self._update(notice=None)
+        self._notices.dismiss()
 
     def execute_notice_action(self) -> None:
-        action = self.state.notice.action if self.state.notice else None
-        self._update(notice=None)
-        match action:
+        notice = self._notices.dismiss()
+        match notice.action if notice else None:
             case NoticeAction.RECOVER:
                 self._recover_runs()
             case NoticeAction.RECONNECT:
@@ -138,12 +137,15 @@ class WindowPresenter(Presenter[WindowState]):
                 self.close_window()
             case NoticeAction.SIMULATE if self._open_stand_instead is not None:
                 self._open_stand_instead()
+            case NoticeAction.OPEN_RUN if notice is not None:
+                self.open_run(notice.path)
 
     def may_close(self) -> bool:
         """Tell whether the window may close; while a run is recorded, ask and name what becomes of it."""
         fate = "" if self.state.is_closing else self.record.fate_when_closed
         if fate:
-            self._ask(fate, NoticeAction.CLOSE, N_("Go on recording"))
+            question = Notice(fate, Tone.WARN, NoticeAction.CLOSE, N_("Go on recording"), is_question=True)
+            self._notices.put(NoticeCause.CLOSING, question)
         return not fate
 
     def close_window(self) -> None:
@@ -164,7 +166,9 @@ class WindowPresenter(Presenter[WindowState]):
         self._open_stand_instead = open_it
         device = self.start.state.connected or self._amplifier
         text = gettext("{device} is connected. The simulated stand would take its place", device=device)
-        self._ask(text, NoticeAction.SIMULATE, N_("Keep the amplifier"))
+        dismiss = N_("Keep the amplifier")
+        question = Notice(text, Tone.WARN, NoticeAction.SIMULATE, dismiss, is_question=True)
+        self._notices.put(NoticeCause.REPLACING, question)
 
     def open_port(self, port: PortSettings) -> None:
         waiting_for = gettext("Connecting to {port}", port=port.url)
@@ -180,7 +184,7 @@ class WindowPresenter(Presenter[WindowState]):
         path = str(Path(path).absolute())
         self.identify.on_opening(path)
         self.show_screen(Screen.IDENTIFY)
-        self._update(notice=None)
+        self._notices.on_run_opened(path)
         self._analyse(path)
 
     def show_runs(self, folder: str, series: str) -> None:
@@ -211,9 +215,7 @@ class WindowPresenter(Presenter[WindowState]):
             presenter.on_gauges(gauges)
 
     def ask_to_recover(self) -> None:
-        count = self._count_unfinished()
-        if count:
-            self._update(notice=recovery.recovery_question(count))
+        self._notices.ask_to_recover()
 
     def warm_up(self) -> None:
         """Load the analysis, so that the first one is as fast as the others."""
@@ -222,12 +224,14 @@ class WindowPresenter(Presenter[WindowState]):
     def tick(self) -> None:
         """Process events of engine and workers, and new samples; called some 60 times a second."""
         if (report := self._errors.next_report()) is not None:  # first: the rest may fail
-            self._update(notice=Notice(sentence(report.message), Tone.BAD, details=report.details))
+            notice = Notice(sentence(report.message), Tone.BAD, details=report.details)
+            self._notices.put(NoticeCause.PROGRAM_ERROR, notice, str(report.message))
         for event in self._connection.poll():
             self._on_engine_event(event)
         for presenter in self.presenters.values():
             presenter.tick()
         self._follow_device()
+        self._notices.follow(is_recording=self.record.is_recording)
         self._analysis.poll()
 
     def close(self) -> None:
@@ -242,6 +246,8 @@ class WindowPresenter(Presenter[WindowState]):
         self.runs.set_author(settings.operator or getpass.getuser())
         self.campaign.set_author(settings.operator or getpass.getuser())
         self._update(theme=settings.theme)
+        if self.settings.state.message.tone is not Tone.BAD:  # they were saved
+            self._notices.withdraw(NoticeCause.SETTINGS)
 
     def _connect(
         self, device: str, waiting_for: str, open_it: Callable[[], None], amplifier: str = ""
@@ -255,22 +261,25 @@ class WindowPresenter(Presenter[WindowState]):
         self.record.dispatch(Connecting(device, waiting_for))
         self.gauges.on_connecting(device)
         self.show_screen(Screen.RECORD)
-        self._update(notice=None)
+        self._notices.withdraw(NoticeCause.CONNECTION)
         open_it()
 
     def _refuse_while_recording(self) -> bool:
         if self.record.is_recording:
             text = gettext("A run is being recorded. Stop it first: Esc on Record")
-            self._update(notice=Notice(text, Tone.WARN))
+            self._notices.put(NoticeCause.RECORDING, Notice(text, Tone.WARN))
         return self.record.is_recording
 
     def _forget_connection(self) -> None:
         self._true_friction = None
         self._amplifier = ""
-        self._withdraw_question(NoticeAction.SIMULATE)
+        self._notices.withdraw(NoticeCause.REPLACING)
         self.record.dispatch(Notification.DISCONNECTED)
         self.gauges.on_disconnected()
         self.start.set_connected("")
+
+    def _show_notice(self, notice: Notice | None, more: int) -> None:
+        self._update(notice=notice, more_notices=more)
 
     def _follow_device(self) -> None:
         """Tell the screens whether samples come; after their `tick`, in which the samples are taken."""
@@ -286,7 +295,7 @@ class WindowPresenter(Presenter[WindowState]):
             self._true_friction = event.true_friction
         self.record.dispatch(event)
         if isinstance(event, RunEnded | Failed):
-            self._withdraw_question(NoticeAction.CLOSE)
+            self._notices.withdraw(NoticeCause.CLOSING)
         if isinstance(event, Connected):
             self.start.set_connected(event.device)
             self.gauges.on_connected(event)
@@ -294,48 +303,37 @@ class WindowPresenter(Presenter[WindowState]):
             self._on_run_ended(event)
         elif isinstance(event, Failed):
             self._forget_connection()
-            self._update(notice=self._failure_notice(event.message, NoticeAction.RECONNECT))
-
-    def _ask(self, text: str, action: NoticeAction, dismiss: str) -> None:
-        self._update(notice=Notice(text, Tone.WARN, action, dismiss, is_question=True))
-
-    def _withdraw_question(self, action: NoticeAction) -> None:
-        """Drop a question whose reason is gone."""
-        if self.state.notice is not None and self.state.notice.action is action:
-            self._update(notice=None)
+            failure = Notice(sentence(event.message), Tone.BAD, NoticeAction.RECONNECT)
+            self._notices.put_failure(NoticeCause.CONNECTION, failure)
 
     def _on_run_ended(self, event: RunEnded) -> None:
         if event.message:
             tone = Tone.WARN if event.ended.is_normal else Tone.BAD
-            self._update(notice=self._failure_notice(event.message, tone=tone))
+            self._notices.put_failure(NoticeCause.RUN, Notice(sentence(event.message), tone))
         if event.path:
             self._true_frictions[event.path] = self._true_friction
             self.identify.on_opening(event.path)
             self._analyse(event.path)
 
-    def _failure_notice(
-        self, message: Message | str, action: NoticeAction | None = None, tone: Tone = Tone.BAD
-    ) -> Notice:
-        if self._count_unfinished():
-            return recovery.offer_recovery(sentence(message))
-        return Notice(sentence(message), tone, action)
-
     def _recover_runs(self) -> None:
-        self._update(notice=recovery.recovery_progress())
+        self._notices.put(NoticeCause.RECOVERY, recovery.recovery_progress())
         self._analysis.submit(
             analysis_task.recover_runs,
             self._folder,
             done=self._on_recovered,
             failed=self._on_recovery_failed,
-            progress=lambda progress: self._update(notice=recovery.recovery_progress(progress)),
+            progress=lambda progress: self._notices.put(
+                NoticeCause.RECOVERY, recovery.recovery_progress(progress)
+            ),
         )
 
     def _on_recovered(self, report: RecoveryReport) -> None:
-        self._update(notice=recovery.recovery_outcome(report))
+        self._notices.put(NoticeCause.RECOVERY, recovery.recovery_outcome(report))
         self.record.dispatch(Notification.RUNS_CHANGED)
 
     def _on_recovery_failed(self, failure: TaskFailure) -> None:
-        self._update(notice=recovery.offer_recovery(sentence(failure.message)))
+        self._notices.withdraw(NoticeCause.RECOVERY)
+        self._notices.put(NoticeCause.UNFINISHED, recovery.offer_recovery(sentence(failure.message)))
 
     def _analyse(self, path: str) -> None:
         self._analysis.submit(

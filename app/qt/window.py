@@ -29,7 +29,7 @@ from app.qt.widgets.icons import icon
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import HelpDialog, add_shortcut, bind_button, list_shortcuts
-from app.qt.widgets.text import label
+from app.qt.widgets.text import label, set_text_or_hide
 from app.qt.window_geometry import WindowGeometry
 from config.schema import WindowLayout
 from messages.i18n import N_, gettext
@@ -76,7 +76,7 @@ class MainWindow(QMainWindow):
             self._theme.fix(SCHEMES[state.theme])
         self._stack.setCurrentWidget(self._screen(state.screen))
         self._rail[state.screen].setChecked(True)
-        self._notice.show_notice(state.notice)
+        self._notice.show_notice(state.notice, state.more_notices)
         if state.is_closing and not old.is_closing:
             QTimer.singleShot(0, self, self.close)
 
@@ -217,6 +217,7 @@ class NoticeBar(QFrame):
         self._focused_before: QWidget | None = None
         self._kind = label()
         self._text = label(wrap=True)
+        self._more = label(muted=True)
         self._fold = make_button("", lambda: self._unfold(self._details.isHidden()))
         self._copy = make_button(gettext("Copy"), self._copy_details)
         self._action = make_button("", presenter.execute_notice_action)
@@ -225,7 +226,9 @@ class NoticeBar(QFrame):
         self._lay_out()
         self.hide()
 
-    def show_notice(self, notice: Notice | None) -> None:
+    def show_notice(self, notice: Notice | None, more: int = 0) -> None:
+        """Show a notice, None hides the bar; `more` notices wait behind it."""
+        set_text_or_hide(self._more, gettext("{count} more", count=more) if more else "")
         is_new = notice != self._shown
         self._shown = notice
         if notice is not None and is_new:
@@ -234,13 +237,18 @@ class NoticeBar(QFrame):
         if is_new and notice is not None and notice.is_question:
             self._focused_before = QApplication.focusWidget()
             self._dismiss.setFocus()
+        elif is_new:
+            self._give_focus_back()
 
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: N802
+        self._give_focus_back()
+        super().hideEvent(event)
+
+    def _give_focus_back(self) -> None:
         """Give the focus back that a question has taken."""
         before, self._focused_before = self._focused_before, None
         if before is not None and isValid(before):
             before.setFocus()
-        super().hideEvent(event)
 
     def _write(self, notice: Notice) -> None:
         for widget in (self, self._kind):
@@ -267,7 +275,7 @@ class NoticeBar(QFrame):
 
     def _lay_out(self) -> None:
         buttons = (self._action, self._fold, self._copy, self._dismiss)
-        line = make_row(self._kind, (self._text, 1), *buttons, spacing=12)
+        line = make_row(self._kind, (self._text, 1), self._more, *buttons, spacing=12)
         layout = make_column(line, self._details, spacing=8, of=self)
         layout.setContentsMargins(12, 8, 8, 8)
 

@@ -31,7 +31,7 @@ from app.acquisition.messages import (
 from app.presenters.base import NoticeAction, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.device_status import DeviceMonitor
-from app.presenters.error_reports import ErrorReporter
+from app.presenters.error_reports import ErrorReporter, error_report
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
@@ -39,6 +39,7 @@ from app.presenters.settings_screen import PersonalSettings
 from app.presenters.start_screen import StartState
 from app.presenters.window import WindowContext, WindowPresenter
 from config.files import load_gauges
+from config.schema import ConfigError, Settings
 
 NOON = datetime.datetime(2026, 2, 1, 12, tzinfo=datetime.UTC)
 
@@ -51,13 +52,15 @@ class Desk:
         self.worker = FakeWorker()
         self.now_s = 0.0
         monitor = DeviceMonitor(lambda: self.now_s, lambda: NOON + datetime.timedelta(seconds=self.now_s))
-        self.session = Connection(*self.launcher.starters, ErrorReporter().report, monitor)
+        self.errors = ErrorReporter()
+        self.session = Connection(*self.launcher.starters, self.errors.report, monitor)
         start = StartState(all_series=bench().all_series, series="1FFM0", recordings="/recordings")
         self.window = WindowPresenter(
             self.session,
             self.worker,  # type: ignore[arg-type]
             FakePool(),
             WindowContext(bench(), start, personal or PersonalSettings()),
+            self.errors,
         )
 
     def tick_until_connected(self) -> None:
@@ -256,6 +259,60 @@ def test_settings_that_cannot_be_read_are_said_once_and_the_usual_ones_hold() ->
     assert notice.text.startswith("/x/settings.toml: theme = 'pink'")
     assert notice.tone is Tone.WARN
     assert desk.window.state.theme == "system"
+
+
+def test_settings_that_are_saved_can_be_read_again() -> None:
+    desk = Desk(PersonalSettings(fault="/x/settings.toml: theme = 'pink': not known"))
+    desk.window.open_run("/recordings/a.h5")
+    assert desk.window.state.notice is not None, "a run has nothing to do with it"
+    desk.window.settings.change(theme="dark")
+    assert desk.window.state.notice is None
+
+
+def test_settings_that_cannot_be_saved_stay_unreadable() -> None:
+    def save(_: Settings) -> None:
+        raise ConfigError("settings.toml: the disk is full")
+
+    desk = Desk(PersonalSettings(fault="/x/settings.toml: theme = 'pink': not known", save=save))
+    desk.window.settings.change(theme="dark")
+    assert desk.window.state.notice is not None
+
+
+def test_notices_wait_for_one_another_and_each_leaves_with_its_cause(desk: Desk) -> None:
+    window = desk.window
+    window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    desk.errors.report(error_report(ValueError("a bug")))
+    window.tick()
+    window.record.dispatch(Action.ARM)
+    desk.play(1.0)
+    window.start.start_simulation()
+    assert window.state.notice is not None
+    assert window.state.notice.text.startswith("A run is being recorded")
+    assert window.state.more_notices == 1
+    desk.play(END_S + 0.1)
+    window.tick()
+    assert window.state.notice.text.startswith("Slipstand itself failed"), "the recording has ended"
+    assert window.state.more_notices == 0
+    window.open_run("/recordings/a.h5")
+    window.start.start_simulation()
+    desk.tick_until_connected()
+    assert window.state.notice.text.startswith("Slipstand itself failed"), "until somebody has read it"
+    window.dismiss_notice()
+    assert window.state.notice is None
+
+
+def test_how_a_run_ended_is_told_until_the_next_is_recorded(desk: Desk) -> None:
+    window = desk.window
+    window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    desk.launcher.engines[0].say(ended(RUN, EndReason.DISK_FULL, "the disk is full. Free some space"))
+    window.tick()
+    window.tick()
+    assert window.state.notice is not None
+    window.record.dispatch(Action.ARM)
+    desk.play(1.0)
+    assert window.state.notice is None
 
 
 def test_what_is_chosen_reaches_the_screens(desk: Desk) -> None:

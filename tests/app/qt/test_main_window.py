@@ -27,6 +27,7 @@ from app.acquisition.messages import Failed, PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.navigator import ConnectForm
+from app.presenters.notices import NoticeSources
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.presenters.start_screen import PortChoice, StartState
@@ -65,7 +66,7 @@ class Desk:
                 bench(),
                 start,
                 list_ports=lambda: (PortChoice("COM7", "FT232R"),),
-                count_unfinished=lambda: self.unfinished,
+                notices=NoticeSources(lambda: self.unfinished),
             ),
             self.faults,
         )
