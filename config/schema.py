@@ -303,6 +303,7 @@ class Settings(_Checked, frozen=True):
     recordings: str = ""  # folder of the runs; empty for the usual one
     operator: str = ""  # who records, unless a run names another operator
     sounds: bool = False  # whether each state of a pullback has a sound
+    count_simulated: bool = False  # whether simulated runs count beside others, in plan and campaign
     log_level: Literal["error", "warning", "info", "debug"] = "info"  # of all logs
 
     def __post_init__(self) -> None:

@@ -71,4 +71,7 @@ class Navigator(Protocol):
     def close_connection(self) -> None:
         """Disconnect, unless a run is being recorded."""
 
+    def count_simulated(self, counted: bool) -> None:
+        """Choose whether simulated runs count beside others, in the plan and on Campaign."""
+
     def set_gauges(self, gauges: Gauges) -> None: ...

@@ -100,7 +100,7 @@ class WindowPresenter(Presenter[WindowState]):
         stand, author = context.stand, getpass.getuser()
         runs, batch = pool.make_worker(), pool.make_worker()
         self.start = StartPresenter(context.start, self, context.list_ports)
-        self.record = RecordPresenter(connection, stand, pool.make_worker(), author)
+        self.record = RecordPresenter(connection, stand, pool.make_worker(), author, self.count_simulated)
         self.identify = IdentifyPresenter(analysis)
         self.gauges = GaugesPresenter(pool.make_worker(), pool.make_worker(), stand.gauges, self)
         connection.add_row_listener(self.gauges.on_rows)
@@ -210,6 +210,9 @@ class WindowPresenter(Presenter[WindowState]):
         if self._open_again is not None:
             self._open_again()
 
+    def count_simulated(self, counted: bool) -> None:
+        self.settings.change(count_simulated=counted)
+
     def set_gauges(self, gauges: Gauges) -> None:
         for presenter in self.presenters.values():
             presenter.on_gauges(gauges)
@@ -245,6 +248,7 @@ class WindowPresenter(Presenter[WindowState]):
         self.record.dispatch(settings)
         self.runs.set_author(settings.operator or getpass.getuser())
         self.campaign.set_author(settings.operator or getpass.getuser())
+        self.campaign.set_count_simulated(settings.count_simulated)
         self._update(theme=settings.theme)
         if self.settings.state.message.tone is not Tone.BAD:  # they were saved
             self._notices.withdraw(NoticeCause.SETTINGS)

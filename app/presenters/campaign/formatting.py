@@ -70,6 +70,9 @@ def summarise(runs: CollectedRuns, all_series: Sequence[str]) -> CampaignSummary
         tuple(f"{Path(failure.run).name}: {sentence(failure.error)}" for failure in runs.failures),
         _warning_texts(runs, campaign),
         sum(details.analysis is None for details in runs.details.values()),
+        len(runs.simulated),
+        runs.is_mixed,
+        bool(runs.simulated) and runs.counts_simulated,
     )
 
 

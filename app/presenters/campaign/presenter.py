@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.campaign.state import (
+    CampaignScope,
     CampaignState,
     CampaignSummary,
     Product,
@@ -38,6 +39,7 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._undos: list[tuple[str, str]] = []
         """Description of each exclusion or inclusion, and path of the run."""
         self._is_collecting = False
+        self._counts_simulated = False
         super().__init__(self._empty_state(folder))
 
     def enter(self) -> None:
@@ -48,6 +50,15 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def set_author(self, name: str) -> None:
         self._author = name
+
+    def set_count_simulated(self, counted: bool) -> None:
+        """Count simulated runs beside others, or not."""
+        if counted is not self._counts_simulated:
+            self._counts_simulated = counted
+            if self.state.is_gathered:
+                self._worker.cancel()
+                self._is_collecting = False
+                self.refresh()
 
     def choose_folder(self, folder: str) -> None:
         self._worker.cancel()
@@ -81,7 +92,7 @@ class CampaignPresenter(Presenter[CampaignState]):
     def undo(self) -> None:
         if self._undos:
             _, path = self._undos.pop()
-            arguments = (self.state.folder, self._all_series, path, self._author)
+            arguments = (self._scope(), path, self._author)
             self._submit(tasks.undo_exclusion, *arguments, done=self._on_summary)
 
     def save_results(self) -> None:
@@ -89,7 +100,7 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def export(self, product: Product, target: str) -> None:
         if self.state.summary.run_count:
-            self._submit(products.write_product, self.state.folder, product, target, done=self._on_written)
+            self._submit(products.write_product, self._scope(), product, target, done=self._on_written)
 
     def simulate_campaign(self) -> None:
         """Simulate a campaign into a new folder below that of the runs, and show it."""
@@ -101,6 +112,9 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def close(self) -> None:
         self._worker.close()
+
+    def _scope(self) -> CampaignScope:
+        return CampaignScope(self.state.folder, self._all_series, self._counts_simulated)
 
     def _empty_state(self, folder: str) -> CampaignState:
         rows = tuple(map(row_without_runs, self._all_series))
@@ -133,10 +147,10 @@ class CampaignPresenter(Presenter[CampaignState]):
         if not self.state.is_gathered:
             self._update(progress=Progress(gettext("Gathering runs")))
         done = partial(self._on_collected, save)
-        self._submit(tasks.collect, self.state.folder, self._all_series, save, done=done)
+        self._submit(tasks.collect, self._scope(), save, done=done)
 
     def _exclude(self, path: str, reason: str) -> None:
-        arguments = (self.state.folder, self._all_series, path, reason, self._author)
+        arguments = (self._scope(), path, reason, self._author)
         self._submit(tasks.exclude_run, *arguments, done=partial(self._on_excluded, path, reason))
 
     def _on_failed(self, failure: TaskFailure) -> None:

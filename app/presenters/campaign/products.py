@@ -4,7 +4,7 @@ import datetime
 from pathlib import Path
 
 from app.presenters.base import Progress, ReportProgress
-from app.presenters.campaign.state import Product
+from app.presenters.campaign.state import CampaignScope, Product
 from app.presenters.campaign.tasks import collected_runs
 from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
 from app.reports.table.files import write_table
@@ -19,12 +19,14 @@ _TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "la
 """By suffix; text for others."""
 
 
-def write_product(folder: str, product: Product, path: str, report: ReportProgress) -> tuple[str, ...]:
+def write_product(
+    scope: CampaignScope, product: Product, path: str, report: ReportProgress
+) -> tuple[str, ...]:
     """Write a product of a folder; return the files. Raises RunError.
 
     Tables and reports replace a file: the dialog has asked. Figures go to a folder and replace nothing.
     """
-    target, runs = Path(path), collected_runs(folder, report)
+    target, runs = Path(path), collected_runs(scope, report)
     report(Progress(gettext("Writing {file}", file=target.name)))
     if product is Product.FIGURES:
         return _write_figures(target, runs, report)

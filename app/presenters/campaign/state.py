@@ -121,6 +121,16 @@ class Product(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
+class CampaignScope:
+    """Which runs are gathered: those of a folder, and for which series of the stand."""
+
+    folder: str
+    all_series: tuple[str, ...]
+    counts_simulated: bool = False
+    """Whether simulated runs count beside others."""
+
+
+@dataclass(frozen=True, slots=True)
 class CampaignSummary:
     """What the runs of a folder say together."""
 
@@ -137,6 +147,9 @@ class CampaignSummary:
     """A line for each run without a result."""
     warnings: tuple[str, ...] = ()  # warnings about the runs together
     unsaved_count: int = 0  # number of runs whose result is not saved in them
+    simulated_count: int = 0  # number of simulated runs in the folder
+    is_mixed: bool = False  # whether there are others beside these
+    simulated_counts: bool = False  # whether these are among the runs
 
     @property
     def run_count(self) -> int:

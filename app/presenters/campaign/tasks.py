@@ -1,13 +1,12 @@
 """Tasks of the Campaign screen, executed in its worker process."""
 
 import datetime
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.presenters.base import ReportProgress, batch_progress
 from app.presenters.campaign.formatting import TARGET_REPEATS, summarise
-from app.presenters.campaign.state import CampaignSummary
+from app.presenters.campaign.state import CampaignScope, CampaignSummary
 from app.runs.batch.executors import ExecutorOptions
 from app.runs.campaign.collect import CollectedRuns, CollectOptions, RunCollection, iter_collected
 from app.runs.edits import edit_run, undo_edit
@@ -39,26 +38,24 @@ class _Cache:
 _cache = _Cache()
 
 
-def collect(folder: str, all_series: Sequence[str], save: bool, report: ReportProgress) -> CampaignSummary:
+def collect(scope: CampaignScope, save: bool, report: ReportProgress) -> CampaignSummary:
     """Collect and summarise the runs of a folder; with `save`, save new results in their runs."""
-    _collect(folder, report, save=save)
-    return summarise(_cache.runs, all_series)
+    _collect(scope, report, save=save)
+    return summarise(_cache.runs, scope.all_series)
 
 
 def exclude_run(
-    folder: str, all_series: Sequence[str], path: str, reason: str, author: str, report: ReportProgress
+    scope: CampaignScope, path: str, reason: str, author: str, report: ReportProgress
 ) -> CampaignSummary:
     """Record in a run why it is excluded, or with an empty reason that it is not, and summarise again."""
     change = edit_run(Path(path), author, excluded=reason)
-    return _summarise_changed(folder, all_series, path, change, report)
+    return _summarise_changed(scope, path, change, report)
 
 
-def undo_exclusion(
-    folder: str, all_series: Sequence[str], path: str, author: str, report: ReportProgress
-) -> CampaignSummary:
+def undo_exclusion(scope: CampaignScope, path: str, author: str, report: ReportProgress) -> CampaignSummary:
     """Undo the last exclusion or inclusion of a run, and summarise again."""
     change = undo_edit(Path(path), author, ("excluded",))
-    return _summarise_changed(folder, all_series, path, change, report)
+    return _summarise_changed(scope, path, change, report)
 
 
 def simulate(folder: str, report: ReportProgress) -> str:
@@ -70,15 +67,17 @@ def simulate(folder: str, report: ReportProgress) -> str:
     return str(place)
 
 
-def collected_runs(folder: str, report: ReportProgress) -> CollectedRuns:
+def collected_runs(scope: CampaignScope, report: ReportProgress) -> CollectedRuns:
     """Runs of a folder, which are collected if they are not those collected last."""
-    if not _cache.holds(folder):
-        _collect(folder, report, save=False)
+    if not _cache.holds(scope.folder):
+        _collect(scope, report, save=False)
+    _count(scope)
     return _cache.runs
 
 
-def _collect(folder: str, report: ReportProgress, *, save: bool) -> None:
+def _collect(scope: CampaignScope, report: ReportProgress, *, save: bool) -> None:
     """Collect the files of a folder that are new or changed since the last call."""
+    folder = scope.folder
     if folder != _cache.folder:
         _cache.folder, _cache.is_whole, _cache.files, _cache.collection = folder, False, {}, RunCollection()
     files_now = _run_files(Path(folder))
@@ -92,21 +91,27 @@ def _collect(folder: str, report: ReportProgress, *, save: bool) -> None:
         _cache.files[collected.path] = files_now[collected.path] if not save else _stamp(Path(collected.path))
     _cache.files = {path: _cache.files[path] for path in files_now}
     _cache.collection.keep_only(files_now)
-    _cache.runs = _cache.collection.collected_runs(_folders(folder), options)
+    _count(scope, save=save)
     _cache.is_whole = True
 
 
+def _count(scope: CampaignScope, *, save: bool = False) -> None:
+    """Take the collected runs that count."""
+    options = CollectOptions(save=save, counts_simulated=scope.counts_simulated)
+    _cache.runs = _cache.collection.collected_runs(_folders(scope.folder), options)
+
+
 def _summarise_changed(
-    folder: str, all_series: Sequence[str], path: str, change: Change, report: ReportProgress
+    scope: CampaignScope, path: str, change: Change, report: ReportProgress
 ) -> CampaignSummary:
     """Update the cached run, of which nothing but the exclusion has changed."""
-    if _cache.holds(folder) and path in _cache.files:
+    if _cache.holds(scope.folder) and path in _cache.files:
         _cache.files[path] = _stamp(Path(path))
         _cache.collection.exclude(path, change.fields["excluded"])
-        _cache.runs = _cache.collection.collected_runs(_folders(folder), CollectOptions())
+        _count(scope)
     else:
-        _collect(folder, report, save=False)
-    return summarise(_cache.runs, all_series)
+        _collect(scope, report, save=False)
+    return summarise(_cache.runs, scope.all_series)
 
 
 def _folders(folder: str) -> list[Path]:

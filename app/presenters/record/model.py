@@ -148,6 +148,8 @@ class EndedRun:
     progress: Progress | None = None
     is_left: bool = False
     """Another device was connected since: going on with it decides nothing about the run."""
+    counts: bool = True
+    """Whether it counts in the plan once it is kept."""
 
     @property
     def is_awaited(self) -> bool:
@@ -236,6 +238,13 @@ class RecordModel:
         if not is_measured or self.session.engine is not PullbackState.RECENTRE:
             return None
         return self.stand.allowed_plate_range(self.next_runs.series)
+
+    def run_text(self, series: str) -> str:
+        """Number of the run in its series, or that it does not count in the plan."""
+        next_runs = self.next_runs
+        if self.session.simulated and next_runs.plan.progress and not next_runs.counts_simulated:
+            return gettext("{series}, not counted in the plan", series=series)
+        return next_runs.run_text(series)
 
     def situation(self, state: PullbackState) -> PullbackSituation:
         session = self.session

@@ -50,6 +50,8 @@ class NextRuns:
     undecided_path: str = ""
     """Run that waits for a decision, and does not count until then; empty without one."""
     suggested_operator: str = ""
+    counts_simulated: bool = False
+    """Whether simulated runs are among the completed ones."""
 
     @classmethod
     def of_series(cls, all_series: tuple[str, ...]) -> "NextRuns":
@@ -183,7 +185,14 @@ class NextRuns:
 
     def _counted(self) -> "NextRuns":
         plan = self.tests.plan
-        return replace(self, plan=PlanState(plan_progress(plan, self._counts()), format_plan(plan)))
+        return replace(
+            self,
+            plan=PlanState(
+                plan_progress(plan, self._counts()),
+                format_plan(plan),
+                counts_simulated=self.counts_simulated,
+            ),
+        )
 
 
 class PlanError(MessageError, ValueError):

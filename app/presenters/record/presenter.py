@@ -1,6 +1,7 @@
 """Presenter of the Record screen: dispatches events to the reducer, carries out effects, shows the state."""
 
 import time
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -56,15 +57,24 @@ class RecordPresenter(Presenter[state.RecordState]):
     """Leads the operator through one pullback test after another.
 
     `files` carries out tasks with run files, and is closed by `close`. `author` decides about runs.
+    `count_simulated` changes whether simulated runs count in the plan.
     """
 
     CLOSE_S = 30.0  # time for tasks that are under way when the window is closed; an analysis takes a second
 
-    def __init__(self, connection: Connection, stand: StandContext, files: Worker, author: str) -> None:
+    def __init__(
+        self,
+        connection: Connection,
+        stand: StandContext,
+        files: Worker,
+        author: str,
+        count_simulated: Callable[[bool], object] = lambda _: None,
+    ) -> None:
         self._model = RecordModel.of_stand(stand, author)
         super().__init__(record_state(self._model))
         self._connection = connection
         self._files = files
+        self.count_simulated = count_simulated
         self._unfinished: list[state.RecordTask] = []
 
     @property

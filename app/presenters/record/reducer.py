@@ -104,8 +104,7 @@ class _Reduction:
                 hint = gettext("The simulated stand runs this series.")
                 self._set(next_runs=model.next_runs.with_fixed_series(series, hint))
             case Settings():
-                next_runs = model.next_runs.with_suggested_operator(event.operator)
-                self._set(sounds=event.sounds, next_runs=next_runs)
+                self._on_settings(event)
             case Gauges():
                 self._set(stand=replace(model.stand, gauges=event), monitors=monitors_of(event))
             case state.Notification.RUNS_CHANGED:
@@ -177,6 +176,13 @@ class _Reduction:
         self._set_session(is_command_pending=True, remaining_runs=count - 1, run=armed)
         self.effects.append(engine.Arm(run, count))
 
+    def _on_settings(self, settings: Settings) -> None:
+        next_runs = self.model.next_runs.with_suggested_operator(settings.operator)
+        before, counts_simulated = next_runs.counts_simulated, settings.count_simulated
+        self._set(sounds=settings.sounds, next_runs=replace(next_runs, counts_simulated=counts_simulated))
+        if counts_simulated is not before and next_runs.is_requested:
+            self._count_completed()
+
     # --- decisions about runs ---
 
     def _decide(self) -> RecordedRun | None:
@@ -213,7 +219,8 @@ class _Reduction:
         if run is not None:
             self._keep(run)
         if run is not None and run.has_results:
-            next_runs = next_runs.with_run(run.path, ended.run.series).with_next_series()
+            counted = next_runs.with_run(run.path, ended.run.series) if ended.counts else next_runs
+            next_runs = counted.with_next_series()
         self._set(live=self.model.live.restarted(), ended=None)
         self._save(next_runs)
         self._set_session(live_estimate=state.LiveEstimate())
@@ -320,7 +327,8 @@ class _Reduction:
     def _load_plan(self) -> None:
         if not self.model.next_runs.is_requested:
             self._set(next_runs=replace(self.model.next_runs, is_requested=True))
-            self.effects.append(state.LoadPlan(str(self.model.stand.directory)))
+            counts_simulated = self.model.next_runs.counts_simulated
+            self.effects.append(state.LoadPlan(str(self.model.stand.directory), counts_simulated))
 
     def _save(self, next_runs: NextRuns) -> None:
         next_runs, task = next_runs.to_save(str(self.model.stand.directory))
@@ -329,7 +337,8 @@ class _Reduction:
             self.effects.append(task)
 
     def _count_completed(self) -> None:
-        self.effects.append(state.CountCompletedRuns(str(self.model.stand.directory)))
+        counts_simulated = self.model.next_runs.counts_simulated
+        self.effects.append(state.CountCompletedRuns(str(self.model.stand.directory), counts_simulated))
 
     # --- identification of the run ---
 
@@ -432,7 +441,8 @@ class _Reduction:
             self._on_disarmed()
             return
         self._set_session(run=replace(session.run, name=""))
-        ended = EndedRun(event, session.run, session.reached, session.true_friction)
+        counts = not session.simulated or self.model.next_runs.counts_simulated
+        ended = EndedRun(event, session.run, session.reached, session.true_friction, counts=counts)
         if event.path:
             self._save(self.model.next_runs.with_undecided(event.path).after_recording())
             ended = replace(ended, progress=Progress(gettext("Identifying")))
@@ -472,9 +482,9 @@ class _Reduction:
     def _run_chip(self) -> Chip:
         model, session = self.model, self.model.session
         if not model.is_run_shown:
-            return Chip(model.next_runs.run_text(model.next_runs.series))
+            return Chip(model.run_text(model.next_runs.series))
         run = model.ended.run if model.ended else session.run
-        text = model.next_runs.run_text(run.series or model.next_runs.series)
+        text = model.run_text(run.series or model.next_runs.series)
         if session.remaining_runs:
             text += gettext(", {count} more by themselves", count=session.remaining_runs)
         return Chip(text, hint=run.name)

@@ -190,6 +190,7 @@ class PlanState:
     progress: tuple[SeriesProgress, ...] = ()
     text: str = ""
     error: str = ""
+    counts_simulated: bool = False  # whether simulated runs are among those that are done
 
     @property
     def planned(self) -> int:
@@ -254,6 +255,7 @@ class LoadPlan:
     """Read the stored plan of a folder, and count its completed runs."""
 
     folder: str
+    counts_simulated: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -268,6 +270,7 @@ class CountCompletedRuns:
     """List the completed runs of a folder; the answer is as `LoadedPlan.completed`."""
 
     folder: str
+    counts_simulated: bool = False
 
 
 @dataclass(frozen=True, slots=True)

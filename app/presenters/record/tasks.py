@@ -1,6 +1,6 @@
 """Tasks of the Record screen, carried out in a worker process."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,17 +19,20 @@ from app.runs.edits import edit_run
 from app.runs.errors import MetadataError, RunError
 from app.runs.file_operations import move_to_trash, restore_from_trash
 from app.runs.listing import list_runs
+from app.runs.metadata import RunSource
 from app.runs.next_tests import counts_as_done, load_next_tests, save_next_tests
 from app.runs.reader import open_run
+from app.runs.summary import RunSummary
 
 
 def execute(task: RecordTask) -> Any:
     """Carry out a task; its class says what the answer is. Raises RunError."""
     match task:
-        case LoadPlan(folder):
-            return _load_plan(Path(folder))
-        case CountCompletedRuns(folder):
-            return _completed_runs(Path(folder), _undecided(Path(folder)))
+        case LoadPlan(folder, counts_simulated):
+            return _load_plan(Path(folder), counts_simulated=counts_simulated)
+        case CountCompletedRuns(folder, counts_simulated):
+            done = _done_runs(Path(folder), _undecided(Path(folder)))
+            return _completed_runs(done, counts_simulated=counts_simulated)
         case SavePlan(folder, tests):
             return save_next_tests(Path(folder), tests)
         case KeepRun():
@@ -41,12 +44,13 @@ def execute(task: RecordTask) -> Any:
             return str(restore_from_trash(Path(path)))
 
 
-def _load_plan(folder: Path) -> LoadedPlan:
+def _load_plan(folder: Path, *, counts_simulated: bool) -> LoadedPlan:
     """Read the stored plan; runs that were decided about elsewhere, or are gone, are no longer undecided."""
     tests = load_next_tests(folder)
-    completed = _completed_runs(folder, tests.undecided)
-    done = {Path(path).name for path, _ in completed}
-    undecided = tuple(name for name in tests.undecided if name not in done and (folder / name).exists())
+    done = _done_runs(folder, tests.undecided)
+    names = {Path(run.path).name for run in done}
+    undecided = tuple(name for name in tests.undecided if name not in names and (folder / name).exists())
+    completed = _completed_runs(done, counts_simulated=counts_simulated)
     return LoadedPlan(tests.replace(undecided=undecided), completed)
 
 
@@ -57,11 +61,15 @@ def _undecided(folder: Path) -> tuple[str, ...]:
         return ()
 
 
-def _completed_runs(folder: Path, undecided: Collection[str]) -> tuple[tuple[str, str], ...]:
+def _done_runs(folder: Path, undecided: Collection[str]) -> list[RunSummary]:
     if not folder.exists():  # the first run creates it
-        return ()
-    runs = list_runs(folder)
-    return tuple((run.path, run.series or "") for run in runs if counts_as_done(run, undecided))
+        return []
+    return [run for run in list_runs(folder) if counts_as_done(run, undecided)]
+
+
+def _completed_runs(done: Sequence[RunSummary], *, counts_simulated: bool) -> tuple[tuple[str, str], ...]:
+    counted = (run for run in done if counts_simulated or run.source is not RunSource.SIMULATED)
+    return tuple((run.path, run.series or "") for run in counted)
 
 
 def _keep(task: KeepRun) -> str:

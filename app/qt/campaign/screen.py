@@ -6,14 +6,14 @@ from functools import partial
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QFrame, QMenu, QPushButton, QStackedWidget, QVBoxLayout, QWidget
 
-from app.presenters.base import Progress
+from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignState, CampaignSummary, Product
 from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import SelectedRuns, clear, make_sections
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.inputs import ProgressBar, ask_for_folder, make_button
+from app.qt.widgets.inputs import CheckBox, ProgressBar, ask_for_folder, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, show_chip
@@ -39,6 +39,11 @@ class CampaignScreen(QWidget):
         self._title = label(role=TextRole.HEADING)
         self._message = label()
         self._working = _Working(presenter)
+        self._simulated = label(role=TextRole.STRONG)
+        self._count_simulated = CheckBox("")
+        self._count_simulated.clicked.connect(presenter.navigator.count_simulated)
+        hint = gettext("In the table, the figures and what is exported, beside recorded runs")
+        self._count_simulated.setToolTip(hint)
         self._keep = make_button("", presenter.save_results)
         self._keep.setToolTip(gettext("Keep new results in their runs: the next gathering is quicker"))
         self._export = QPushButton(gettext("Export…"))
@@ -56,7 +61,8 @@ class CampaignScreen(QWidget):
         self._stack.addWidget(self._make_page())
         self._stack.addWidget(self._empty)
         buttons = (self._keep, self._export, self._undo, self._folder, refresh)
-        top = make_row(self._title, (self._working, 1), *buttons, spacing=8, margins=(4, 0))
+        sources = (self._simulated, self._count_simulated)
+        top = make_row(self._title, *sources, (self._working, 1), *buttons, spacing=8, margins=(4, 0))
         make_column(top, self._message, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
         menu = QMenu(self)
         for product in Product:
@@ -103,6 +109,11 @@ class CampaignScreen(QWidget):
         self._export.setEnabled(summary.run_count > 0 and state.progress is None)
         self._working.show_progress(state.progress)
         show_chip(self._message, state.message)
+        show_chip(self._simulated, _simulated_chip(summary))
+        self._count_simulated.setVisible(summary.is_mixed)
+        self._count_simulated.setChecked(summary.simulated_counts)
+        text = ngettext("{count} simulated run", "{count} simulated runs", summary.simulated_count)
+        self._count_simulated.setText(text)
 
     def _choose_folder(self) -> None:
         title = gettext("Gather the runs of a folder")
@@ -131,6 +142,14 @@ class CampaignScreen(QWidget):
         side.setFixedWidth(_COLUMN_WIDTH)
         make_row((left, 1), side, spacing=8, of=page)
         return page
+
+
+def _simulated_chip(summary: CampaignSummary) -> Chip:
+    if not summary.simulated_counts:
+        return EMPTY_CHIP
+    if summary.is_mixed:
+        return Chip(gettext("SIMULATED and recorded"), Tone.WARN)
+    return Chip(gettext("SIMULATED"), Tone.WARN)
 
 
 class _Working(QWidget):

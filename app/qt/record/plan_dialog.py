@@ -7,7 +7,7 @@ from app.presenters.base import Chip, Tone
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import PlanEdited, PlanState
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import make_button
+from app.qt.widgets.inputs import CheckBox, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
@@ -29,6 +29,8 @@ class PlanDialog(QDialog):
         self._text.setMaximumHeight(96)
         self._text.setTabChangesFocus(True)
         self._message = label(wrap=True)
+        self._simulated = CheckBox(gettext("Simulated runs count, too"))
+        self._simulated.clicked.connect(presenter.count_simulated)
         self._series = QGridLayout()
         hint = gettext("Plan anew; runs that are there count (Ctrl+Enter)")
         self._save = make_button(gettext("Use this plan"), self._use, hint, primary=True)
@@ -47,6 +49,7 @@ class PlanDialog(QDialog):
         self._text.setFocus()
 
     def show_plan(self, plan: PlanState) -> None:
+        self._simulated.setChecked(plan.counts_simulated)
         words = gettext("{done} of {planned} runs are there", done=plan.done, planned=plan.planned)
         if plan.error:
             show_chip(self._message, Chip(plan.error, Tone.BAD))
@@ -74,7 +77,7 @@ class PlanDialog(QDialog):
             label(gettext("Series plan"), TextRole.HEADING),
             label(gettext(_HELP), muted=True, wrap=True),
             self._text,
-            self._message,
+            make_row((self._message, 1), self._simulated, spacing=12),
             (make_scroll_area(inside, is_column=False), 1),
             make_row(STRETCH, self._close, self._save, spacing=12),
             spacing=12,

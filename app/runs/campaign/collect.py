@@ -19,7 +19,9 @@ from app.runs.campaign.run_result import CollectedRun, RunDetails, collect_run
 from app.runs.file_operations import list_trash
 from app.runs.journal import unfinished_journals
 from app.runs.listing import resolve_run_files
+from app.runs.metadata import RunSource
 from config.schema import ConfigError, Gauges, Stand
+from messages.i18n import N_
 from messages.message import Message, message
 
 Shared = TypeVar("Shared", Stand, Gauges)
@@ -34,6 +36,8 @@ class CollectOptions(msgspec.Struct, frozen=True):
     """How to analyse runs whose result does not stand."""
     excluded: dict[str, str] = {}
     """Why runs do not count, by absolute path, beside the reasons that are kept in the runs."""
+    counts_simulated: bool = True
+    """Whether simulated runs count beside others. Where there are no others, they do."""
 
 
 CountedRun = tuple[RunResult, RunDetails]
@@ -64,6 +68,9 @@ class CollectedRuns:
     details: dict[str, RunDetails]
     excluded: tuple[Excluded, ...] = ()
     """Runs without a result that are excluded in any case, with reasons."""
+    simulated: tuple[str, ...] = ()  # paths of all simulated runs that have a result
+    is_mixed: bool = False  # whether there are others beside these
+    counts_simulated: bool = True  # whether the simulated ones are among `runs`
 
     @property
     def stands(self) -> dict[str, Stand]:
@@ -158,6 +165,11 @@ class RunCollection:
 
     def collected_runs(self, folders: Sequence[Path], options: CollectOptions) -> CollectedRuns:
         pairs = [(one.result, one.details) for one in self._collected.values() if one.result and one.details]
+        simulated = tuple(run.name for run, details in pairs if _is_simulated(details))
+        is_mixed = 0 < len(simulated) < len(pairs)
+        counts_simulated = options.counts_simulated or not is_mixed
+        if not counts_simulated:
+            pairs = [(run, details) for run, details in pairs if not _is_simulated(details)]
         runs = tuple(_with_reasons(pairs, options.excluded))
         details = {run.name: its for run, (_, its) in zip(runs, pairs, strict=True)}
         counted = [(run, details[run.name]) for run in runs if not run.excluded]
@@ -171,7 +183,12 @@ class RunCollection:
             else:
                 failures.append(FailedRun(one.path, one.error))
         warnings = tuple(campaign_warnings(counted, folders, saved=options.save))
-        return CollectedRuns(runs, tuple(failures), warnings, details, tuple(excluded))
+        found = runs, tuple(failures), warnings, details, tuple(excluded)
+        return CollectedRuns(*found, simulated, is_mixed, counts_simulated)
+
+
+def _is_simulated(details: RunDetails) -> bool:
+    return details.metadata.source_type is RunSource.SIMULATED
 
 
 def _with_reasons(
@@ -193,11 +210,24 @@ def campaign_warnings(
     runs: Sequence[CountedRun], folders: Sequence[Path], *, saved: bool
 ) -> Iterator[ResultWarning]:
     """Warnings of runs together; `folders` are those that were searched."""
+    yield from _simulated_and_real(runs)
     yield from _different_stands(runs)
     yield from _contradictory_masses(runs)
     yield from _stale(runs, saved=saved)
     yield from _series_without_runs(runs)
     yield from _left_out(folders)
+
+
+def _simulated_and_real(runs: Sequence[CountedRun]) -> Iterator[ResultWarning]:
+    simulated = [run.name for run, details in runs if _is_simulated(details)]
+    if simulated and len(simulated) < len(runs):
+        template = N_(
+            "{count} of these {all} runs are simulated and count beside recorded ones: {listed}. Keep them in"
+            " a folder of their own."
+        )
+        listed = _listed(simulated)
+        text = message(template, count=len(simulated), all=len(runs), listed=listed)
+        yield ResultWarning("simulated-and-real", text)
 
 
 def _different_stands(runs: Sequence[CountedRun]) -> Iterator[ResultWarning]:

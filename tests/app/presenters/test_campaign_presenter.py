@@ -10,7 +10,9 @@ from stage import Call, FakeWorker
 from analysis.campaign.campaign import summarize
 from app.presenters.base import Progress, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.campaign.state import Product
+from app.presenters.campaign.state import CampaignScope, Product
+
+SCOPE = CampaignScope(FOLDER, ALL_SERIES)
 
 
 class Stage:
@@ -51,13 +53,27 @@ def test_entering_gathers_once_and_shows_how_far_it_is(stage: Stage) -> None:
     stage.presenter.refresh()
     stage.presenter.refresh()
     assert [call.name for call in stage.worker.calls] == ["collect"]
-    assert stage.asked() == ("collect", FOLDER, ALL_SERIES, False)
+    assert stage.asked() == ("collect", SCOPE, False)
     stage.last.progress(Progress("3 of 9 runs", 0.3))
     assert stage.presenter.state.progress == Progress("3 of 9 runs", 0.3)
     stage.last.done(found())
     assert stage.presenter.state.progress is None
     stage.presenter.refresh()
     assert len(stage.worker.calls) == 2
+
+
+def test_simulated_runs_are_counted_anew_when_they_are_chosen(stage: Stage) -> None:
+    stage.presenter.set_count_simulated(True)
+    assert stage.worker.calls == [], "the screen was not shown yet"
+    stage.presenter.set_count_simulated(False)
+    stage.gather()
+    stage.presenter.set_count_simulated(False)
+    assert len(stage.worker.calls) == 1
+    stage.presenter.set_count_simulated(True)
+    assert stage.asked() == ("collect", replace(SCOPE, counts_simulated=True), False)
+    stage.last.done(found())
+    stage.presenter.export(Product.TABLE, "/tmp/t.csv")
+    assert stage.asked()[1] == replace(SCOPE, counts_simulated=True)
 
 
 def test_every_series_of_the_stand_has_a_row_and_what_is_missing_is_said(stage: Stage) -> None:
@@ -168,7 +184,7 @@ def test_a_run_is_left_out_with_a_reason_taken_in_and_all_undone(stage: Stage) -
     assert stage.presenter.state.message.tone is Tone.WARN
     assert stage.last.name == "collect"
     stage.presenter.exclude_run(path, " the plate was touched ")
-    assert stage.asked() == ("exclude_run", FOLDER, ALL_SERIES, path, "the plate was touched", "me")
+    assert stage.asked() == ("exclude_run", SCOPE, path, "the plate was touched", "me")
     stage.last.done(found(excluded={path: "the plate was touched"}))
     (line,) = stage.presenter.state.summary.excluded
     assert (line.name, line.reason, line.can_return) == ("1FFM0_001.h5", "The plate was touched", True)
@@ -176,13 +192,13 @@ def test_a_run_is_left_out_with_a_reason_taken_in_and_all_undone(stage: Stage) -
     assert stage.presenter.state.message.text == "1FFM0_001 is left out"
     stage.presenter.set_author("you")
     stage.presenter.include_run(path)
-    assert stage.asked() == ("exclude_run", FOLDER, ALL_SERIES, path, "", "you")
+    assert stage.asked() == ("exclude_run", SCOPE, path, "", "you")
     stage.last.done(found())
     assert stage.presenter.state.undo_text == "taking in"
     assert stage.presenter.state.message.text == "1FFM0_001 counts again"
     for left in ("leaving out", ""):
         stage.presenter.undo()
-        assert stage.asked() == ("undo_exclusion", FOLDER, ALL_SERIES, path, "you")
+        assert stage.asked() == ("undo_exclusion", SCOPE, path, "you")
         stage.last.done(found())
         assert stage.presenter.state.undo_text == left
     assert stage.presenter.state.summary.excluded == ()
@@ -226,7 +242,7 @@ def test_products_are_written(stage: Stage) -> None:
     assert stage.worker.calls == []
     stage.gather()
     stage.presenter.export(Product.TABLE, "/tmp/t.csv")
-    assert stage.asked() == ("write_product", FOLDER, Product.TABLE, "/tmp/t.csv")
+    assert stage.asked() == ("write_product", SCOPE, Product.TABLE, "/tmp/t.csv")
     stage.last.done(("/tmp/t.csv",))
     assert stage.presenter.state.message.text == "Wrote /tmp/t.csv"
     stage.presenter.export(Product.REPORT, "/tmp/r.pdf")
@@ -239,7 +255,7 @@ def test_results_that_are_not_kept_are_counted_and_kept_on_request(stage: Stage)
     stage.gather(found(unsaved=4))
     assert stage.presenter.state.summary.unsaved_count == 4
     stage.presenter.save_results()
-    assert stage.asked() == ("collect", FOLDER, ALL_SERIES, True)
+    assert stage.asked() == ("collect", SCOPE, True)
     stage.last.done(found())
     assert stage.presenter.state.message.text == "New results are kept in their runs"
 
@@ -260,7 +276,7 @@ def test_a_synthetic_campaign_is_made_and_then_gathered(stage: Stage) -> None:
     stage.presenter.simulate_campaign()
     assert stage.asked() == ("simulate", FOLDER)
     stage.last.done("/recordings/synthetic-campaign-1")
-    assert stage.asked() == ("collect", "/recordings/synthetic-campaign-1", ALL_SERIES, False)
+    assert stage.asked() == ("collect", CampaignScope("/recordings/synthetic-campaign-1", ALL_SERIES), False)
     assert stage.presenter.state.folder == "/recordings/synthetic-campaign-1"
 
 
@@ -271,7 +287,7 @@ def test_another_folder_forgets_what_could_be_undone(stage: Stage) -> None:
     stage.presenter.refresh()
     earlier = stage.last
     stage.presenter.choose_folder("/elsewhere")
-    assert stage.asked() == ("collect", "/elsewhere", ALL_SERIES, False)
+    assert stage.asked() == ("collect", CampaignScope("/elsewhere", ALL_SERIES), False)
     assert (stage.presenter.state.summary.run_count, stage.presenter.state.undo_text) == (0, "")
     earlier.done(found())
     assert stage.presenter.state.summary.run_count == 0

@@ -58,7 +58,7 @@ def test_what_was_shown_is_what_is_kept(run: Path) -> None:
     assert found == analysed.results["friction_dynamic"].value == pytest.approx(0.1, rel=1e-3)
     assert kept.metadata.note == "hand trembled"
     assert [change.author for change in kept.changes] == ["me"]
-    assert done(CountCompletedRuns(folder)) == ((str(run), "1FFM0"),)
+    assert done(CountCompletedRuns(folder, counts_simulated=True)) == ((str(run), "1FFM0"),)
 
 
 def test_a_kept_run_holds_what_the_command_line_would_have_kept(
@@ -102,7 +102,7 @@ def test_what_is_put_aside_does_not_count_and_comes_back_whole(run: Path) -> Non
     assert open_run(Path(trashed), trusted=True).metadata.note == "stand was touched"
     assert done(CountCompletedRuns(str(run.parent))) == ()
     assert done(RestoreFromTrash(trashed)) == str(run)
-    assert done(CountCompletedRuns(str(run.parent))) == ((str(run), "1FFM0"),)
+    assert done(CountCompletedRuns(str(run.parent), counts_simulated=True)) == ((str(run), "1FFM0"),)
 
 
 def test_a_folder_that_is_not_there_yet_holds_nothing_and_takes_a_plan(tmp_path: Path) -> None:
@@ -121,7 +121,18 @@ def test_runs_that_wait_for_a_decision_do_not_count_until_they_are_analysed_or_g
     assert isinstance(loaded, LoadedPlan)
     assert loaded.tests.undecided == (run.name,), "the other one is gone"
     done(KeepRun(str(run), "me", has_results=True))
-    assert done(CountCompletedRuns(folder)) == ((str(run), "1FFM0"),)
-    loaded = done(LoadPlan(folder))
+    assert done(CountCompletedRuns(folder, counts_simulated=True)) == ((str(run), "1FFM0"),)
+    loaded = done(LoadPlan(folder, counts_simulated=True))
     assert isinstance(loaded, LoadedPlan)
     assert (loaded.tests.undecided, loaded.completed) == ((), ((str(run), "1FFM0"),))
+    assert done(LoadPlan(folder)) == LoadedPlan(NextTests()), "it is simulated, and decided about"
+
+
+def test_simulated_runs_count_in_the_plan_only_if_they_are_chosen(run: Path) -> None:
+    done(KeepRun(str(run), "me", has_results=True))
+    folder = str(run.parent)
+    assert done(CountCompletedRuns(folder)) == ()
+    assert done(LoadPlan(folder)).completed == ()
+    chosen = ((str(run), "1FFM0"),)
+    assert done(CountCompletedRuns(folder, counts_simulated=True)) == chosen
+    assert done(LoadPlan(folder, counts_simulated=True)).completed == chosen

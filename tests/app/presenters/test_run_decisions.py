@@ -637,3 +637,49 @@ def test_states_are_heard_only_by_who_wants_to() -> None:
     assert desk.record.state.cue is Cue.RELEASED
     desk.come_to(PullbackState.IDLE)
     assert desk.record.state.choices.form.operator == "N. N."
+
+
+# --- simulated runs in the plan ---
+
+
+def simulated_desk(*, counts: bool) -> Desk:
+    desk = Desk()
+    desk.record.dispatch(Settings(count_simulated=counts))
+    desk.record.dispatch(Connecting("Simulated stand"))
+    desk.record.dispatch(SimulationStarted("1FFM0", 0.1))
+    desk.record.dispatch(Connected("slipstand-fw", "simulated-1", 1000.0, "/ring"))
+    desk.come_to(PullbackState.IDLE)
+    desk.tasks()
+    return desk
+
+
+@pytest.mark.parametrize(("counts", "done"), [(False, 0), (True, 1)])
+def test_a_simulated_run_fills_the_plan_only_if_it_was_chosen(counts: bool, done: int) -> None:
+    desk = simulated_desk(counts=counts)
+    shown = "1FFM0 run 1 of 2" if counts else "1FFM0, not counted in the plan"
+    assert desk.record.state.status_bar.run.text == shown
+    desk.result()
+    desk.record.dispatch(Action.NEXT)
+    assert desk.record.state.plan.done == done
+    assert desk.tasks()[0] == KeepRun(RUN, "me", None, has_results=True), "it is kept in any case"
+
+
+def test_the_choice_is_remembered_and_counts_the_folder_again() -> None:
+    desk = Desk()
+    assert not desk.record.state.plan.counts_simulated
+    desk.record.dispatch(Settings(count_simulated=True))
+    assert desk.tasks() == [CountCompletedRuns("/recordings", counts_simulated=True)]
+    desk.answer(CountCompletedRuns("/recordings", counts_simulated=True), ((RUN, "1FFM0"),))
+    assert desk.record.state.plan.counts_simulated
+    assert desk.record.state.plan.done == 1
+    desk.record.dispatch(Settings(count_simulated=True, sounds=True))
+    assert desk.tasks() == [], "nothing else was changed"
+
+
+def test_the_plan_is_loaded_with_what_was_chosen_before() -> None:
+    worker = FakeWorker()
+    record = RecordPresenter(FakeRecorder(), bench(), worker, "me")  # type: ignore[arg-type]
+    record.dispatch(Settings(count_simulated=True))
+    record.enter()
+    (call,) = worker.calls
+    assert call.arguments == (LoadPlan("/recordings", counts_simulated=True),)

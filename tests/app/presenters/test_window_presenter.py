@@ -321,6 +321,17 @@ def test_what_is_chosen_reaches_the_screens(desk: Desk) -> None:
     assert desk.window.record.state.choices.form.operator == "Anna"
 
 
+def test_simulated_runs_are_chosen_once_for_plan_and_campaign() -> None:
+    saved: list[Settings] = []
+    desk = Desk(PersonalSettings(save=saved.append))
+    desk.window.record.count_simulated(True)
+    assert [settings.count_simulated for settings in saved] == [True]
+    assert desk.window.campaign._scope().counts_simulated
+    desk.window.campaign.navigator.count_simulated(False)
+    assert not saved[-1].count_simulated
+    assert not desk.window.campaign._scope().counts_simulated
+
+
 def test_gauge_2_gets_a_port_of_its_own_beside_what_is_filled_in(desk: Desk) -> None:
     desk.window.fill_connection(ConnectForm("COM7", "csv"))
     desk.window.fill_second_port("COM8")

@@ -1,5 +1,6 @@
 """The Campaign screen: Table 1 as it fills, the figure, and what leads on from there."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,6 +13,7 @@ from stage import Call, FakeWorker
 
 from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
+from app.presenters.campaign.state import CampaignScope
 from app.qt.campaign.screen import CampaignScreen
 from app.qt.theme import Theme
 
@@ -36,6 +38,9 @@ class Stage:
 
     def open_run(self, path: str) -> None:
         self.went.append((path,))
+
+    def count_simulated(self, counted: bool) -> None:
+        self.went.append(counted)
 
     def show_record(self) -> None:
         self.went.append(("record",))
@@ -101,6 +106,24 @@ def test_a_campaign_is_drawn(stage: Stage) -> None:
     assert "FF" in stage.screen._plot._stack.accessibleName()
 
 
+def test_simulated_runs_are_named_and_chosen_by_a_switch(stage: Stage) -> None:
+    stage.gathered()
+    switch = stage.screen._count_simulated
+    assert not switch.isVisible()
+    assert "SIMULATED" not in stage.words()
+    stage.gathered(replace(found(), simulated_count=9, simulated_counts=True))
+    assert "SIMULATED" in stage.words()
+    assert not switch.isVisible(), "there is nothing to choose from"
+    stage.gathered(replace(found(), simulated_count=4, is_mixed=True))
+    assert "SIMULATED" not in stage.words()
+    assert (switch.isVisible(), switch.isChecked(), switch.text()) == (True, False, "4 simulated runs")
+    switch.click()
+    assert stage.went == [True]
+    stage.gathered(replace(found(), simulated_count=4, is_mixed=True, simulated_counts=True))
+    assert "SIMULATED and recorded" in stage.words()
+    assert switch.isChecked()
+
+
 def test_effects_of_the_stand_have_a_block(stage: Stage) -> None:
     stage.gathered()
     assert "Effects of the stand" not in stage.words()
@@ -128,7 +151,7 @@ def test_a_run_is_left_out_by_button_with_the_reason_that_was_typed(stage: Stage
     qtbot.keyClicks(stage.screen._chosen._reason, "touched")
     qtbot.mouseClick(stage.button("Leave out"), Qt.MouseButton.LeftButton)
     path = path_of("1FFM0", 1)
-    assert stage.asked() == ("exclude_run", FOLDER, ALL_SERIES, path, "touched", "me")
+    assert stage.asked() == ("exclude_run", CampaignScope(FOLDER, ALL_SERIES), path, "touched", "me")
     stage.gathered(found(excluded={path: "touched"}))
     assert stage.button("Take in").isVisible()
     assert "1FFM0_001.h5: Touched" in stage.words()
