@@ -88,7 +88,9 @@ class Connection:
 
     @property
     def stand(self) -> SimulatedStand | None:
-        return None if self._opened is None else self._opened.stand
+        """The simulated stand, while it runs."""
+        stand = None if self._opened is None else self._opened.stand
+        return stand if stand is not None and stand.is_running else None
 
     def open_simulated(self, options: SimulatedStandOptions) -> None:
         self._open(lambda: self._simulate(options))

@@ -214,6 +214,11 @@ class RunMetadata(_FrozenStruct, frozen=True):
         is_simulated = computed or is_simulated_device(self.device, self.port)
         return RunSource.SIMULATED if is_simulated else RunSource.REAL
 
+    @property
+    def origin(self) -> str:
+        """Where samples come from that no stand gave; empty for a recorded run."""
+        return self.source or ("" if self.source_type is RunSource.REAL else self.source_type.value)
+
     def format_start(self, pattern: str) -> str:
         """Start by a pattern of `strftime`; "" where it is not known."""
         return "" if self.start_time is None else self.start_time.strftime(pattern)

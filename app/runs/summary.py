@@ -68,7 +68,7 @@ def summarize_file(file: h5py.File) -> RunSummary:
         path=file.filename,
         **{name: getattr(metadata, name) for name in _OF_METADATA},
         source=metadata.source_type,
-        origin=metadata.source,
+        origin=metadata.origin,
         samples=rows,
         duration_s=float(file[schema.TIME][rows - 1]) if rows else 0.0,
         ended=read_text(file, schema.ENDED),

@@ -235,6 +235,8 @@ def analysed(path: str = RUN, **changes: Any) -> AnalysedRun:
 class FakeSimulation:
     """A simulated stand that is none."""
 
+    is_running = True
+
     def __init__(self, options: SimulatedStandOptions) -> None:
         self.port = "fake://"
         self.options = options

@@ -89,7 +89,7 @@ def _summary(material: CampaignReportInput) -> blocks.Facts:
         ("recorded", "" if not days else days[0] if days[0] == days[-1] else f"{days[0]} to {days[-1]}"),
         ("operators", ", ".join(sorted({one.operator for one in facts if one.operator}))),
         ("stand", ", ".join(stand.name for stand in gathered.stands.values())),
-        ("source", ", ".join(sorted({one.source for one in facts if one.source}))),
+        ("source", ", ".join(sorted({one.origin for one in facts if one.origin}))),
     ]
     return shared.without_empty(rows)
 

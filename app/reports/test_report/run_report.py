@@ -125,7 +125,7 @@ def _test(analysis: Analysis) -> blocks.Facts:
         ("protocol", device.protocol),
         ("port", metadata.port),
         ("nominal rate", "" if metadata.rate_hz is None else f"{metadata.rate_hz:g} samples a second"),
-        ("source", metadata.source),
+        ("source", metadata.origin),
         ("ended", "" if ending is None else _ENDINGS.get(ending.ended, ending.ended)),
         ("hold before release", "" if ending is None else shared.in_unit(ending.dwell_s, SECOND, 2)),
         ("slip lasted", shared.in_unit(slip_s, SECOND, 3)),

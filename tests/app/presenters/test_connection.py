@@ -65,6 +65,17 @@ def wait_for(condition: Callable[[], bool]) -> None:
         time.sleep(0.002)
 
 
+def test_a_stand_that_has_ended_is_not_offered(session: Connection, launcher: FakeLauncher) -> None:
+    session.open_simulated(SimulatedStandOptions())
+    poll_until(session, Connected)
+    (stand,) = launcher.simulations
+    assert session.stand is stand
+    stand.is_running = False
+    assert session.stand is None
+    session.disconnect()
+    wait_for(lambda: stand.stopped)
+
+
 def test_nothing_happens_before_something_is_opened(session: Connection) -> None:
     assert session.poll() == []
     assert session.new_rows() is None

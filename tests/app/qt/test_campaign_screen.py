@@ -160,7 +160,7 @@ def test_a_run_is_left_out_by_button_with_the_reason_that_was_typed(stage: Stage
     stage.screen.activateWindow()
     qtbot.waitUntil(stage.screen._table.hasFocus)
     qtbot.keyClick(stage.screen, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
-    assert stage.asked() == ("undo_exclusion", FOLDER, ALL_SERIES, path, "me")
+    assert stage.asked() == ("undo_exclusion", CampaignScope(FOLDER, ALL_SERIES), path, "me")
 
 
 @pytest.mark.parametrize("size", [(932, 640), (1188, 800), (1828, 1080)], ids=lambda size: f"{size[0]}")

@@ -82,3 +82,10 @@ def test_a_file_that_cannot_be_read_has_no_source(tmp_path):
     (tmp_path / "run.h5").write_bytes(b"no run")
     (listed,) = list_runs(tmp_path)
     assert listed.source is None
+
+
+def test_what_no_stand_gave_has_an_origin_in_words():
+    assert recorded().origin == ""
+    assert recorded(stated_source=RunSource.SIMULATED).origin == "simulated"
+    imported = DeviceIdentity(IMPORT_PROTOCOL, "a.csv")
+    assert recorded(device=imported, source="imported from a.csv").origin == "imported from a.csv"
