@@ -171,6 +171,17 @@ def save_window_layout(place: schema.WindowLayout, day: datetime.date) -> Path |
     return _save(config_directory() / "window.toml", values, schema.WindowLayout, day)
 
 
+def load_recent() -> schema.RecentUse:
+    """Read what was used last; nothing where nothing was. Raises ConfigError."""
+    return _load_or_default(config_directory() / "recent.toml", schema.RecentUse)
+
+
+def save_recent(recent: schema.RecentUse, day: datetime.date) -> Path | None:
+    """Keep what was used last, as `save_settings` keeps settings. Raises ConfigError."""
+    values = {name: value for name, value in msgspec.to_builtins(recent).items() if value is not None}
+    return _save(config_directory() / "recent.toml", values, schema.RecentUse, day)
+
+
 def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date) -> Path | None:
     """Write values into a file that may be there already; one that cannot be read is put aside first."""
     import tomlkit  # only needed to write

@@ -303,6 +303,7 @@ class Settings(_Checked, frozen=True):
     recordings: str = ""  # folder of the runs; empty for the usual one
     operator: str = ""  # who records, unless a run names another operator
     sounds: bool = False  # whether each state of a pullback has a sound
+    connect_at_start: bool = False  # whether the window connects to the last amplifier by itself
     log_level: Literal["error", "warning", "info", "debug"] = "info"  # of all logs
 
     def __post_init__(self) -> None:
@@ -333,6 +334,33 @@ class WindowLayout(_Checked, frozen=True):
                 raise ValueError(
                     f"{name} = {value} is beyond any screen: must be within ±{_MAX_PIXELS} pixels"
                 )
+
+
+class RecentDevice(_Checked, frozen=True):
+    """The amplifier that was connected last, as its port is typed on Start."""
+
+    name: str  # by which the device calls itself
+    port: str
+    protocol: str
+    baud: str = ""
+    rate_hz: str = ""
+    parity: Literal["N", "E", "O"] = "N"
+    stop_bits: Literal["1", "2"] = "1"
+    settings: str = ""
+    relative_port: str = ""
+    usb: str = ""
+    """USB numbers of the port, by which it is found under another name; empty for others."""
+
+
+class RecentUse(_Checked, frozen=True):
+    """What was used last; runs and folders newest first."""
+
+    device: RecentDevice | None = None
+    runs: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
+    """Folders of runs."""
+    export_folder: str = ""
+    import_folder: str = ""
 
 
 class PublishedRow(_Checked, frozen=True):

@@ -7,8 +7,9 @@ from pathlib import Path
 from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import PortSettings
 from app.presenters.connection import Connection
-from app.presenters.error_reports import ErrorReporter
+from app.presenters.error_reports import ErrorReporter, error_report
 from app.presenters.navigator import ConnectForm, StandContext
+from app.presenters.recent import RecentItems
 from app.presenters.settings_screen import PersonalSettings, SettingsFile
 from app.presenters.start_screen import PortChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter
@@ -18,7 +19,7 @@ from app.runs.paths import RECORDINGS, journal_folders, recordings_directory
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config import files
-from config.schema import ConfigError, Settings
+from config.schema import ConfigError, RecentUse, Settings
 from drivers.registry import DRIVERS
 from messages.i18n import N_
 
@@ -65,19 +66,39 @@ def make_window_presenter(
             simulation,
             _list_ports,
             lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(context.directory)),
+            _read_recent(errors),
         ),
         errors,
     )
 
 
 def _save(settings: Settings) -> Path | None:
-    return files.save_settings(settings, datetime.datetime.now().astimezone().date())
+    return files.save_settings(settings, _today())
 
 
 def _list_ports() -> tuple[PortChoice, ...]:
     from drivers.port import list_ports
 
-    return tuple(PortChoice(port.device, port.description) for port in list_ports())
+    return tuple(
+        PortChoice(port.device, port.description, port.identity.removeprefix(port.device).strip())
+        for port in list_ports()
+    )
+
+
+def _read_recent(errors: ErrorReporter) -> RecentItems:
+    def report(error: ConfigError) -> None:
+        errors.report(error_report(error))
+
+    try:
+        recent = files.load_recent()
+    except ConfigError as error:
+        report(error)
+        recent = RecentUse()
+    return RecentItems(recent, lambda changed: files.save_recent(changed, _today()), report)
+
+
+def _today() -> datetime.date:
+    return datetime.datetime.now().astimezone().date()
 
 
 def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> StartState:

@@ -1,13 +1,15 @@
 """The Start screen: state and presenter. Connects to the simulated stand or an amplifier, or opens a run."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 
 from app.acquisition.messages import PortSettings
 from app.presenters.base import Presenter
 from app.presenters.navigator import ConnectForm, Navigator
 from app.presenters.number_text import FormError, parse_number
+from app.presenters.recent import RecentItems
+from config.schema import RecentDevice
 from drivers.driver import DeviceDriver
 from messages.i18n import gettext, translate
 
@@ -16,11 +18,16 @@ from messages.i18n import gettext, translate
 class PortChoice:
     url: str
     description: str = ""
+    usb: str = ""
+    """USB numbers, which stay where the name changes; empty for other ports."""
 
 
 @dataclass(frozen=True, slots=True)
 class StartState:
-    """State of the screen. `busy` names the work in progress, `connected` the connected device."""
+    """State of the screen. `busy` names the work in progress, `connected` the connected device.
+
+    `last_device` is name and port of the amplifier that was connected last, `runs` the paths of recent runs.
+    """
 
     all_series: tuple[str, ...]
     series: str
@@ -31,6 +38,8 @@ class StartState:
     recordings: str = ""
     busy: str = ""
     connected: str = ""
+    last_device: str = ""
+    runs: tuple[str, ...] = ()
 
     @property
     def selected_protocol(self) -> DeviceDriver | None:
@@ -41,11 +50,19 @@ class StartPresenter(Presenter[StartState]):
     """Checks the form, and opens connections and runs; `ports` lists the serial ports of this computer."""
 
     def __init__(
-        self, state: StartState, navigator: Navigator, ports: Callable[[], tuple[PortChoice, ...]]
+        self,
+        state: StartState,
+        navigator: Navigator,
+        ports: Callable[[], tuple[PortChoice, ...]],
+        recent: RecentItems | None = None,
     ) -> None:
+        self._recent = recent or RecentItems()
+        if self._recent.device is not None:
+            state = replace(state, form=_recent_form(self._recent.device))
         super().__init__(state)
         self.navigator = navigator
         self._ports = ports
+        self._show_recent()
 
     def set_series(self, code: str) -> None:
         if code in self.state.all_series:
@@ -55,8 +72,27 @@ class StartPresenter(Presenter[StartState]):
         if not self.state.busy:
             self.navigator.open_simulated(self.state.series)
 
-    def refresh_ports(self) -> None:
+    def refresh(self) -> None:
+        """List ports and recent items anew."""
         self._update(ports=self._ports())
+        self._show_recent()
+
+    def open_run(self, path: str) -> None:
+        self.navigator.open_run(path)
+
+    def connect_last(self) -> None:
+        """Connect the last amplifier, also where its USB port has another name now."""
+        device = self._recent.device
+        if device is not None:
+            form = _recent_form(device)
+            self.set_form(replace(form, port=_present_port(device, self._ports())))
+            self.connect()
+
+    def remember_device(self, name: str, port: PortSettings) -> None:
+        """Keep what is connected now as the last amplifier."""
+        usb = next((choice.usb for choice in self.state.ports if choice.url == port.url), "")
+        self._recent.set_device(RecentDevice(name=name, usb=usb, **asdict(connect_form(port))))
+        self._show_recent()
 
     def set_form(self, form: ConnectForm) -> None:
         self._update(form=form, form_error="")
@@ -77,6 +113,11 @@ class StartPresenter(Presenter[StartState]):
     def set_connected(self, device: str) -> None:
         self._update(connected=device, busy="")
 
+    def _show_recent(self) -> None:
+        device = self._recent.device
+        last = "" if device is None else gettext("{device} on {port}", device=device.name, port=device.port)
+        self._update(last_device=last, runs=self._recent.runs)
+
 
 def port_settings(form: ConnectForm) -> PortSettings:
     """Settings of a port. Raises FormError."""
@@ -92,6 +133,30 @@ def port_settings(form: ConnectForm) -> PortSettings:
         device=_settings(form.settings),
         relative_url=form.relative_port.strip(),
     )
+
+
+def connect_form(port: PortSettings) -> ConnectForm:
+    """Form that `port_settings` reads as these settings."""
+    return ConnectForm(
+        port=port.url,
+        protocol=port.protocol,
+        baud="" if port.baud is None else str(port.baud),
+        rate_hz="" if port.rate_hz is None else repr(port.rate_hz),
+        parity=port.parity or "N",
+        stop_bits=str(port.stop_bits or 1),
+        settings=" ".join(f"{key}={value}" for key, value in port.device.items()),
+        relative_port=port.relative_url,
+    )
+
+
+def _recent_form(device: RecentDevice) -> ConnectForm:
+    return ConnectForm(**{name: getattr(device, name) for name in ConnectForm.__dataclass_fields__})
+
+
+def _present_port(device: RecentDevice, ports: Sequence[PortChoice]) -> str:
+    """Address of the port of a device now: where its adapter is another one by name, if only one is alike."""
+    alike = [port.url for port in ports if port.usb and port.usb == device.usb]
+    return alike[0] if len(alike) == 1 else device.port
 
 
 def _settings(text: str) -> dict[str, str]:

@@ -25,6 +25,7 @@ from app.presenters.error_reports import ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.navigator import ConnectForm, StandContext
+from app.presenters.recent import RecentItems
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import AnalysisFailed, AnalysisProgress, Connecting, Notification
 from app.presenters.recovery import RecoveryReport
@@ -66,6 +67,7 @@ class WindowContext:
     list_ports: Callable[[], tuple[PortChoice, ...]] = tuple
     count_unfinished: Callable[[], int] = lambda: 0
     """Number of runs in the folder that a crash has left unfinished."""
+    recent: RecentItems = field(default_factory=RecentItems)
 
 
 class WindowPresenter(Presenter[WindowState]):
@@ -90,14 +92,16 @@ class WindowPresenter(Presenter[WindowState]):
         self._pool = pool
         self._count_unfinished = context.count_unfinished
         self._folder = str(context.stand.directory)
+        self._recent = context.recent
         self._open_again: Callable[[], None] | None = None
         self._open_stand_instead: Callable[[], None] | None = None
-        self._amplifier = ""  # connected or being connected; empty without one, and with a simulated stand
+        self._port: PortSettings | None = None
+        """Port of the amplifier that is connected or being connected; None for the simulated stand."""
         self._true_friction: float | None = None
         self._true_frictions: dict[str, float | None] = {}
         stand, author = context.stand, getpass.getuser()
         runs, batch = pool.make_worker(), pool.make_worker()
-        self.start = StartPresenter(context.start, self, context.list_ports)
+        self.start = StartPresenter(context.start, self, context.list_ports, self._recent)
         self.record = RecordPresenter(connection, stand, pool.make_worker(), author)
         self.identify = IdentifyPresenter(analysis)
         self.gauges = GaugesPresenter(pool.make_worker(), pool.make_worker(), stand.gauges, self)
@@ -105,8 +109,12 @@ class WindowPresenter(Presenter[WindowState]):
         self.stand = StandPresenter(
             context.simulation, context.start.all_series, self.open_stand, lambda: connection.stand
         )
-        self.runs = RunsPresenter(runs, batch, self._folder, stand.all_series, author, self.open_run)
-        self.campaign = CampaignPresenter(pool.make_worker(), self._folder, stand.all_series, author, self)
+        self.runs = RunsPresenter(
+            runs, batch, self._folder, stand.all_series, author, self.open_run, self._recent
+        )
+        self.campaign = CampaignPresenter(
+            pool.make_worker(), self._folder, stand.all_series, author, self, self._recent
+        )
         self.settings = SettingsPresenter(context.personal, self._apply_settings)
         self.presenters: dict[Screen, Presenter[Any]] = {screen: getattr(self, screen) for screen in Screen}
         self._apply_settings(context.personal.settings)
@@ -156,18 +164,22 @@ class WindowPresenter(Presenter[WindowState]):
         waiting_for = gettext("Starting the simulated stand")
         start = partial(self._connection.open_simulated, options)
         open_it = partial(self._connect, gettext("Simulated stand"), waiting_for, start)
-        if not self._amplifier or self.record.is_recording:
+        if self._port is None or self.record.is_recording:
             open_it()
             return
         self._open_stand_instead = open_it
-        device = self.start.state.connected or self._amplifier
+        device = self.start.state.connected or self._port.url
         text = gettext("{device} is connected. The simulated stand would take its place", device=device)
         self._ask(text, NoticeAction.SIMULATE, N_("Keep the amplifier"))
 
     def open_port(self, port: PortSettings) -> None:
         waiting_for = gettext("Connecting to {port}", port=port.url)
-        open_it = partial(self._connection.open_port, port)
-        self._connect(port.url, waiting_for, open_it, amplifier=port.url)
+        self._connect(port.url, waiting_for, partial(self._connection.open_port, port), port)
+
+    def connect_at_start(self) -> None:
+        """Connect the last amplifier, if that is a setting."""
+        if self.settings.state.settings.connect_at_start:
+            self.start.connect_last()
 
     def close_connection(self) -> None:
         if not self._refuse_while_recording():
@@ -176,6 +188,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def open_run(self, path: str) -> None:
         path = str(Path(path).absolute())
+        self._recent.add_run(path)
         self.identify.on_opening(path)
         self.show_screen(Screen.IDENTIFY)
         self._update(notice=None)
@@ -241,13 +254,13 @@ class WindowPresenter(Presenter[WindowState]):
         self._update(theme=settings.theme)
 
     def _connect(
-        self, device: str, waiting_for: str, open_it: Callable[[], None], amplifier: str = ""
+        self, device: str, waiting_for: str, open_it: Callable[[], None], port: PortSettings | None = None
     ) -> None:
         if self._refuse_while_recording():
             return
-        self._open_again = partial(self._connect, device, waiting_for, open_it, amplifier)
+        self._open_again = partial(self._connect, device, waiting_for, open_it, port)
         self._forget_connection()
-        self._amplifier = amplifier
+        self._port = port
         self.start.set_busy(waiting_for)
         self.record.dispatch(Connecting(device, waiting_for))
         self.gauges.on_connecting(device)
@@ -263,7 +276,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _forget_connection(self) -> None:
         self._true_friction = None
-        self._amplifier = ""
+        self._port = None
         self._withdraw_question(NoticeAction.SIMULATE)
         self.record.dispatch(Notification.DISCONNECTED)
         self.gauges.on_disconnected()
@@ -277,6 +290,8 @@ class WindowPresenter(Presenter[WindowState]):
             self._withdraw_question(NoticeAction.CLOSE)
         if isinstance(event, Connected):
             self.start.set_connected(event.device)
+            if self._port is not None:
+                self.start.remember_device(event.device, self._port)
             self.gauges.on_connected(event)
         elif isinstance(event, RunEnded):
             self._on_run_ended(event)
@@ -297,6 +312,7 @@ class WindowPresenter(Presenter[WindowState]):
             tone = Tone.WARN if event.ended.is_normal else Tone.BAD
             self._update(notice=self._failure_notice(event.message, tone=tone))
         if event.path:
+            self._recent.add_run(event.path)
             self._true_frictions[event.path] = self._true_friction
             self.identify.on_opening(event.path)
             self._analyse(event.path)
@@ -339,6 +355,8 @@ class WindowPresenter(Presenter[WindowState]):
         self.identify.on_analysed(run, self._true_frictions.get(str(run.path)))
 
     def _on_analysis_failed(self, path: str, failure: TaskFailure) -> None:
+        if not Path(path).exists():
+            self._recent.remove_runs((path,))
         self.record.dispatch(AnalysisFailed(path, failure.message))
         self.identify.on_failed(path, failure.message)
 

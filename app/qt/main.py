@@ -90,6 +90,7 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     window.show()
     if simulated is None:
         QTimer.singleShot(0, window, window.show_last_screen)
+        QTimer.singleShot(0, window, presenter.connect_at_start)
     else:
         QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)

@@ -39,6 +39,7 @@ class SettingsScreen(QWidget):
         self._recordings = QLineEdit()
         self._recordings.setPlaceholderText(presenter.personal.recordings)
         self._sounds = CheckBox(gettext("Sound at each state of a pullback"))
+        self._connects = CheckBox(gettext("Connect to the last amplifier at the start"))
         self._undo = make_button(gettext("Undo"), presenter.undo)
         self._message = label(wrap=True)
         self._waits = label(wrap=True)
@@ -48,6 +49,7 @@ class SettingsScreen(QWidget):
         )
         self._recordings.editingFinished.connect(self._write_folder)
         self._sounds.clicked.connect(lambda checked: presenter.change(sounds=checked))
+        self._connects.clicked.connect(lambda checked: presenter.change(connect_at_start=checked))
         bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
 
     def show_state(self, state: SettingsState) -> None:
@@ -56,6 +58,7 @@ class SettingsScreen(QWidget):
             choice.setCurrentIndex(choice.findData(getattr(settings, name)))
         show_texts({"operator": self._operator, "recordings": self._recordings}, settings)
         self._sounds.setChecked(settings.sounds)
+        self._connects.setChecked(settings.connect_at_start)
         self._undo.setEnabled(state.can_undo)
         show_chip(self._message, state.message)
         waits = gettext("Language, size, folder and log change at the next start")
@@ -110,7 +113,7 @@ class SettingsScreen(QWidget):
         grid = make_form_grid(fields)
         self._recordings.setAccessibleName(gettext("Folder of the runs"))
         in_use = label(_folder_words(self._presenter.personal), muted=True, wrap=True)
-        return _card(gettext("Recording"), "", grid, in_use, self._sounds)
+        return _card(gettext("Recording"), "", grid, in_use, self._sounds, self._connects)
 
     def _files_card(self) -> QFrame:
         hint = gettext("Stand and gauges are read when the window starts or a device is connected.")

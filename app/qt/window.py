@@ -1,7 +1,7 @@
 """The main window: side bar, notice, and the screens, each built when first shown."""
 
 import importlib
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QFontDatabase, QGuiApplication, QHideEvent
@@ -10,7 +10,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QFrame,
-    QMainWindow,
     QPlainTextEdit,
     QStackedWidget,
     QToolButton,
@@ -21,6 +20,7 @@ from shiboken6 import isValid
 from app.presenters.base import Notice
 from app.presenters.screens import Screen
 from app.presenters.window import WindowPresenter, WindowState
+from app.qt.keyboard import KeyboardWindow
 from app.qt.settings_screen import SettingsScreen
 from app.qt.stand_screen import StandScreen
 from app.qt.start_screen import StartScreen
@@ -34,12 +34,15 @@ from app.qt.window_geometry import WindowGeometry
 from config.schema import WindowLayout
 from messages.i18n import N_, gettext
 
+if TYPE_CHECKING:  # its import loads drivers, which the first paint does without
+    from app.qt.find_dialog import FindDialog
+
 TICK_MS = 16
 _SMALLEST = QSize(1024, 640)
 _AT_FOOT = (Screen.SETTINGS,)
 
 
-class MainWindow(QMainWindow):
+class MainWindow(KeyboardWindow):
     """Shows `WindowState`; a timer calls the presenter's `tick`. The presenter is closed with the window."""
 
     closed = Signal(WindowLayout)
@@ -51,6 +54,7 @@ class MainWindow(QMainWindow):
         self._geometry = WindowGeometry(place or WindowLayout())
         self._shown = presenter.state
         self._screens: dict[Screen, QWidget] = {}
+        self._find: FindDialog | None = None
         self._export: QDialog | None = None
         self._import: QDialog | None = None
         self._help: QDialog | None = None
@@ -74,11 +78,17 @@ class MainWindow(QMainWindow):
         old, self._shown = self._shown, state
         if state.theme != old.theme:
             self._theme.fix(SCHEMES[state.theme])
-        self._stack.setCurrentWidget(self._screen(state.screen))
+        screen = self._screen(state.screen)
+        if self._stack.currentWidget() is not screen or state.screen is not old.screen:
+            self._stack.setCurrentWidget(screen)
+            self.focus_home()
         self._rail[state.screen].setChecked(True)
         self._notice.show_notice(state.notice)
         if state.is_closing and not old.is_closing:
             QTimer.singleShot(0, self, self.close)
+
+    def home(self) -> QWidget | None:
+        return self._stack.currentWidget()
 
     def show_last_screen(self) -> None:
         """Show the screen of the last session, unless another one is shown by now."""
@@ -94,6 +104,13 @@ class MainWindow(QMainWindow):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.fileSelected.connect(self._presenter.open_run)
         dialog.open()
+
+    def find_amplifier(self) -> None:
+        from app.qt.find_dialog import FindDialog
+
+        if self._find is None:
+            self._find = FindDialog(self._presenter.gauges.ports, self)
+        self._find.look()
 
     def ask_for_export(self) -> None:
         from app.qt.runs.export_dialog import ExportDialog
@@ -142,6 +159,7 @@ class MainWindow(QMainWindow):
     def _screen(self, screen: Screen) -> QWidget:
         if screen not in self._screens:
             self._screens[screen] = made = self._build_screen(screen)
+            made.setAccessibleName(gettext(screen.label))
             self._stack.addWidget(made)
             self._geometry.restore_parts(made)
         return self._screens[screen]
@@ -153,7 +171,7 @@ class MainWindow(QMainWindow):
         view: Any
         match screen:
             case Screen.START:
-                view = StartScreen(window.start, self.ask_for_run)
+                view = StartScreen(window.start, self.ask_for_run, self.find_amplifier)
             case Screen.STAND:
                 view = StandScreen(window.stand)
             case Screen.SETTINGS:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone, run_count_text
+from app.presenters.recent import RecentItems
 from app.presenters.results import sentence
 from app.presenters.runs import changes
 from app.presenters.runs.analysis_queue import AnalysisQueue
@@ -37,9 +38,12 @@ class RunsPresenter(Presenter[RunsState]):
         all_series: tuple[str, ...],
         author: str,
         open_run: Callable[[str], None],
+        recent: RecentItems | None = None,
     ) -> None:
         super().__init__(RunsState(folder=folder, all_series=all_series))
-        self.export_dialog = ExportPresenter(worker)
+        self.recent = recent or RecentItems()
+        self._recordings = folder
+        self.export_dialog = ExportPresenter(worker, self.recent)
         self.import_dialog = ImportPresenter(worker, self._on_imported)
         self._worker = worker
         self._analysis_worker = analysis_worker
@@ -72,7 +76,13 @@ class RunsPresenter(Presenter[RunsState]):
     def set_author(self, name: str) -> None:
         self._author = name
 
+    @property
+    def recent_folders(self) -> tuple[str, ...]:
+        """Folders that were shown last, and that of the recordings."""
+        return self.recent.folders_with(self._recordings)
+
     def choose_folder(self, folder: str) -> None:
+        self.recent.add_folder(folder)
         self._undos.clear()
         self._update(
             folder=folder, rows=(), total=0, is_listed=False, selected=(), metadata=None, overlay=None,
@@ -173,6 +183,7 @@ class RunsPresenter(Presenter[RunsState]):
             self._submit(changes.copy(runs, self.state.folder))
         others = tuple(path for path in paths if path not in runs)
         if others:
+            self.recent.set_import_file(others[0])
             self.import_dialog.open(others, self.state.folder, self._author)
         return bool(others)
 

@@ -13,6 +13,7 @@ from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.sections import SelectedRuns, clear, make_sections
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
+from app.qt.widgets.folder_button import FolderButton, OpenFolderButton
 from app.qt.widgets.inputs import ProgressBar, ask_for_folder, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
@@ -38,12 +39,14 @@ class CampaignScreen(QWidget):
         self._shown = CampaignState("", CampaignSummary(()))
         self._title = label(role=TextRole.HEADING)
         self._message = label()
+        self._open_folder = OpenFolderButton()
         self._working = _Working(presenter)
         self._keep = make_button("", presenter.save_results)
         self._keep.setToolTip(gettext("Keep new results in their runs: the next gathering is quicker"))
         self._export = QPushButton(gettext("Export…"))
         self._undo = make_button(gettext("Undo"), presenter.undo)
-        self._folder = make_button(gettext("Folder…"), self._choose_folder)
+        title = gettext("Gather the runs of a folder")
+        self._folder = FolderButton(title, lambda: presenter.recent_folders, presenter.choose_folder)
         refresh = make_button(gettext("Refresh"), presenter.refresh)
         self._table = SeriesTable(theme)
         self._table.row_selected.connect(presenter.select_series)
@@ -51,13 +54,20 @@ class CampaignScreen(QWidget):
         self._plot = FrictionPlot(theme)
         self._chosen = SelectedRuns(presenter)
         self._sections = QVBoxLayout()
-        self._empty = _Empty(presenter, self._choose_folder)
+        self._empty = _Empty(presenter, self._folder.ask)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._make_page())
         self._stack.addWidget(self._empty)
         buttons = (self._keep, self._export, self._undo, self._folder, refresh)
         top = make_row(self._title, (self._working, 1), *buttons, spacing=8, margins=(4, 0))
-        make_column(top, self._message, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
+        make_column(
+            top,
+            make_row(self._message, self._open_folder, STRETCH, spacing=8),
+            (self._stack, 1),
+            spacing=8,
+            margins=(8, 8),
+            of=self,
+        )
         menu = QMenu(self)
         for product in Product:
             action = menu.addAction(gettext(product.value))
@@ -66,7 +76,7 @@ class CampaignScreen(QWidget):
         add_shortcut(self, "Ctrl+E", gettext("Export table, figures or report"), self._export.showMenu)
         bind_button(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
         bind_button(refresh, "F5", gettext("Gather the folder again"), self)
-        add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
+        add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._folder.ask)
 
     def show_state(self, state: CampaignState) -> None:
         old, self._shown = self._shown, state
@@ -96,6 +106,7 @@ class CampaignScreen(QWidget):
         counted = ngettext("{count} run", "{count} runs", summary.run_count)
         of_all = gettext("Campaign: {runs} in {series} series", runs=counted, series=summary.series_count)
         self._title.setText(of_all if summary.run_count else gettext("Campaign"))
+        self._folder.folder = state.folder
         self._folder.setToolTip(gettext("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
         self._keep.setText(ngettext("Keep {count} result", "Keep {count} results", summary.unsaved_count))
         self._keep.setVisible(summary.unsaved_count > 0 and state.progress is None)
@@ -103,18 +114,16 @@ class CampaignScreen(QWidget):
         self._export.setEnabled(summary.run_count > 0 and state.progress is None)
         self._working.show_progress(state.progress)
         show_chip(self._message, state.message)
-
-    def _choose_folder(self) -> None:
-        title = gettext("Gather the runs of a folder")
-        ask_for_folder(self, title, self._shown.folder, self._presenter.choose_folder)
+        self._open_folder.show_folder(state.written_to)
 
     def _ask_for_target(self, product: Product) -> None:
         kinds, name = _TARGETS[product]
         export = partial(self._presenter.export, product)
+        folder = self._presenter.recent.export_folder or self._shown.folder
         if not kinds:
-            ask_for_folder(self, gettext("Export"), self._shown.folder, export)
+            ask_for_folder(self, gettext("Export"), folder, export)
             return
-        dialog = QFileDialog(self, gettext("Export"), self._shown.folder, gettext(kinds))
+        dialog = QFileDialog(self, gettext("Export"), folder, gettext(kinds))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.selectFile(name)

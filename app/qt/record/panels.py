@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QRectF, QSize, Qt
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QSizePolicy, QWidget
 
 from app.presenters.base import Chip, Progress, Tone
@@ -261,7 +261,7 @@ class DecisionPanel(QFrame):
 
     def _button(self, action: Action) -> QPushButton:
         text, key, keys, description = _DECISION_BUTTONS[action]
-        button = _EnterButton(f"{gettext(text)}\n{key}")
+        button = QPushButton(f"{gettext(text)}\n{key}")
         button.setProperty("scale", "large")
         button.clicked.connect(lambda: self._dispatch(action))
         if keys:
@@ -269,17 +269,3 @@ class DecisionPanel(QFrame):
         else:  # the run bar has the shortcut
             button.setToolTip(gettext(description))
         return button
-
-
-class _EnterButton(QPushButton):
-    """Button that Enter presses while it has the focus, even if Enter is a shortcut of the screen."""
-
-    def event(self, event: QEvent) -> bool:
-        is_enter = isinstance(event, QKeyEvent) and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
-        if is_enter and event.type() == QEvent.Type.ShortcutOverride:
-            event.accept()
-            return True
-        if is_enter and event.type() == QEvent.Type.KeyPress:
-            self.click()
-            return True
-        return super().event(event)

@@ -106,11 +106,6 @@ class RunBar(QFrame):
         """Say whether Stop keeps a run or none."""
         self._name(Action.STOP, _DISARM if disarms else None)
 
-    def take_focus(self) -> None:
-        usable = [button for button in self._buttons.values() if button.isEnabled()]
-        usable.sort(key=lambda button: button.property("primary") != "true")
-        (usable[0] if usable else self).setFocus()
-
     def _show_summary(self) -> None:
         choices = self._shown
         unfolded = self._form.isVisibleTo(self)

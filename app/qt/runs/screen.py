@@ -13,7 +13,8 @@ from app.qt.runs.preview import RunsPreview
 from app.qt.runs.selected_runs import ActionBar, MetadataEditor
 from app.qt.runs.table import RunsTable
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.inputs import ComboBox, ask_for_folder, make_button, make_choice
+from app.qt.widgets.folder_button import FolderButton
+from app.qt.widgets.inputs import ComboBox, make_button, make_choice
 from app.qt.widgets.layouts import make_column, make_frame, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
@@ -41,7 +42,8 @@ class RunsScreen(QWidget):
         self._status = make_choice({status: status.value for status in StatusFilter})
         self._count = label(muted=True)
         self._import = make_button(gettext("Import…"), self._choose_files)
-        self._folder = make_button(gettext("Folder…"), self._choose_folder)
+        title = gettext("Show the runs of a folder")
+        self._folder = FolderButton(title, lambda: presenter.recent_folders, presenter.choose_folder)
         self._table = RunsTable(theme)
         self._empty = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
@@ -83,7 +85,10 @@ class RunsScreen(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         super().showEvent(event)
-        self._table.setFocus()
+        self.take_focus()
+
+    def take_focus(self) -> None:
+        (self._table if self._table.isVisible() else self).setFocus()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
@@ -104,7 +109,9 @@ class RunsScreen(QWidget):
             self._dialogs.show_import()
 
     def _choose_files(self) -> None:
-        dialog = QFileDialog(self, gettext("Import records of other programs"))
+        dialog = QFileDialog(
+            self, gettext("Import records of other programs"), self._presenter.recent.import_folder
+        )
         endings = " ".join(f"*{suffix}" for suffix in (*SUFFIXES, RUN_SUFFIX))
         dialog.setNameFilters([gettext("Records ({endings})", endings=endings), gettext("All files (*)")])
         dialog.setFileMode(QFileDialog.FileMode.ExistingFiles)
@@ -119,6 +126,7 @@ class RunsScreen(QWidget):
         self._count.setText(count if state.is_listed else "")
         hint = gettext("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder)
         self._folder.setToolTip(hint)
+        self._folder.folder = state.folder
         self._empty.setText(_empty_text(state))
         was_empty = self._middle.currentIndex() == 1
         self._middle.setCurrentIndex(0 if state.rows else 1)
@@ -130,10 +138,6 @@ class RunsScreen(QWidget):
         status = StatusFilter(self._status.currentData())
         self._presenter.set_filter(RunFilter(self._text.text(), series, status))
 
-    def _choose_folder(self) -> None:
-        folder = self._shown.folder if self._shown else ""
-        ask_for_folder(self, gettext("Show the runs of a folder"), folder, self._presenter.choose_folder)
-
     def _connect(self) -> None:
         for changed in (self._text.textChanged, self._series.activated, self._status.activated):
             changed.connect(lambda _: self._apply_filter())
@@ -144,7 +148,7 @@ class RunsScreen(QWidget):
         self._preview.zoomed.connect(self._presenter.zoom_overlay)
         self._metadata.edited.connect(self._presenter.edit)
         add_shortcut(self, "Ctrl+F", gettext("Search"), self.focus_search)
-        add_shortcut(self, "Ctrl+L", gettext("Show the runs of another folder"), self._choose_folder)
+        add_shortcut(self, "Ctrl+L", gettext("Show the runs of another folder"), self._folder.ask)
         add_shortcut(self, "F5", gettext("Look into the folder again"), self._presenter.refresh)
         self._actions.add_keys(self, self._table)
 

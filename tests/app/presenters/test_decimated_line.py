@@ -14,9 +14,7 @@ VALUES[1000:9000] = np.nan
 
 
 @pytest.mark.parametrize("pixels", [64, 1000, 1919])
-@pytest.mark.parametrize(
-    ("start_s", "end_s"), [(-5.0, 500.0), (0.0, 150.0), (3.3, 99.9), (40.0, 47.0)]
-)
+@pytest.mark.parametrize(("start_s", "end_s"), [(-5.0, 500.0), (0.0, 150.0), (3.3, 99.9), (40.0, 47.0)])
 def test_each_span_has_its_extremes(start_s: float, end_s: float, pixels: int) -> None:
     line = DecimatedLine(TIME_S, VALUES).part(start_s, end_s, pixels)
     assert line.is_min_max

@@ -24,18 +24,21 @@ from app.presenters.base import NoticeAction, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.navigator import ConnectForm
+from app.presenters.recent import RecentItems
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings
 from app.presenters.start_screen import StartState
 from app.presenters.window import WindowContext, WindowPresenter
 from config.files import load_gauges
+from config.schema import RecentDevice, RecentUse, Settings
 
 
 class Desk:
     """A window presenter with everything around it."""
 
-    def __init__(self, personal: PersonalSettings | None = None) -> None:
+    def __init__(self, personal: PersonalSettings | None = None, recent: RecentItems | None = None) -> None:
+        self.recent = recent or RecentItems()
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
         self.session = Connection(*self.launcher.starters, ErrorReporter().report)
@@ -44,7 +47,7 @@ class Desk:
             self.session,
             self.worker,  # type: ignore[arg-type]
             FakePool(),
-            WindowContext(bench(), start, personal or PersonalSettings()),
+            WindowContext(bench(), start, personal or PersonalSettings(), recent=self.recent),
         )
 
     def tick_until_connected(self) -> None:
@@ -341,3 +344,38 @@ def test_the_question_of_closing_leaves_with_the_recording(desk: Desk) -> None:
     desk.play(END_S + 0.1)
     assert desk.window.state.notice is None
     assert desk.window.may_close()
+
+
+def test_an_amplifier_is_remembered_once_it_is_connected_and_the_simulated_stand_never(desk: Desk) -> None:
+    desk.window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    assert desk.recent.device is None
+    desk.window.open_port(PortSettings("COM7", "csv"))
+    assert desk.recent.device is None
+    desk.tick_until_connected()
+    assert desk.recent.device == RecentDevice("Slipstand simulator", "COM7", "csv")
+    desk.window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    assert desk.window.start.state.last_device == "Slipstand simulator on COM7"
+
+
+@pytest.mark.parametrize("wanted", [False, True])
+def test_the_last_amplifier_is_connected_at_the_start_if_that_is_a_setting(wanted: bool) -> None:
+    recent = RecentItems(RecentUse(RecentDevice("GSV-8", "COM7", "csv")))
+    desk = Desk(PersonalSettings(Settings(connect_at_start=wanted)), recent)
+    desk.window.connect_at_start()
+    if wanted:
+        desk.tick_until_connected()
+    assert [port.url for port in desk.launcher.ports] == (["COM7"] if wanted else [])
+    desk.session.close()
+
+
+def test_recorded_and_opened_runs_are_recent_until_they_are_gone(desk: Desk) -> None:
+    desk.window.open_run("/recordings/a.h5")
+    desk.window.start.start_simulation()
+    desk.tick_until_connected()
+    desk.window.record.dispatch(Action.ARM)
+    desk.play(END_S + 0.1)
+    assert desk.recent.runs == (RUN, "/recordings/a.h5")
+    desk.worker.calls[0].fail("there is no such run")
+    assert desk.recent.runs == (RUN,)
