@@ -63,6 +63,8 @@ class _Reduction:
                 self._on_clock(now_s)
             case Action():
                 self._on_action(event)
+            case state.Notification.SCREEN_ENTERED if model.next_runs.is_loaded:
+                self._count_completed()  # runs may have been moved or brought back on Runs
             case state.Notification.SCREEN_ENTERED:
                 self._load_plan()
             case state.SeriesChosen(series):

@@ -64,12 +64,17 @@ _PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
 """What fits into the preview of the export dialog."""
 
 
-def list_folder(folder: str, report: ReportProgress) -> tuple[RunSummary, ...]:
+def list_folder(folder: str, in_trash: bool, report: ReportProgress) -> tuple[RunSummary, ...]:
+    """Runs of a folder, or with `in_trash` those in its trash."""
     path = Path(folder)
     if not path.exists():  # the recordings folder is made by the first run
         return ()
     text = gettext("Looking at new files")
-    return tuple(list_runs(path, progress=lambda done, count: report(Progress(text, done / count))))
+
+    def on_progress(done: int, count: int) -> None:
+        report(Progress(text, done / count))
+
+    return tuple(list_runs(path, progress=on_progress, in_trash=in_trash))
 
 
 def change_runs(

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFileDialog, QLineEdit, QStackedWidget, QWidget
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton, QStackedWidget, QWidget
 
 from app.presenters.runs.presenter import RUN_SUFFIX, RunsPresenter
 from app.presenters.runs.state import RunFilter, RunsState, StatusFilter
@@ -14,7 +14,7 @@ from app.qt.runs.selected_runs import ActionBar, MetadataEditor
 from app.qt.runs.table import RunsTable
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.folder_button import FolderButton
-from app.qt.widgets.inputs import ComboBox, make_button, make_choice
+from app.qt.widgets.inputs import ComboBox, ask, make_button, make_choice
 from app.qt.widgets.layouts import make_column, make_frame, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
@@ -44,6 +44,8 @@ class RunsScreen(QWidget):
         self._import = make_button(gettext("Import…"), self._choose_files)
         title = gettext("Show the runs of a folder")
         self._folder = FolderButton(title, lambda: presenter.recent_folders, presenter.choose_folder)
+        self._trash = QPushButton(gettext("Show trash"))
+        self._trash.setCheckable(True)
         self._table = RunsTable(theme)
         self._empty = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
@@ -52,7 +54,7 @@ class RunsScreen(QWidget):
         side = QWidget()
         make_column((self._preview, 1), self._metadata, spacing=6, of=side)
         self._side = make_frame(side)
-        self._actions = ActionBar(presenter, dialogs.ask_for_export)
+        self._actions = ActionBar(presenter, dialogs.ask_for_export, self._ask_to_empty)
         self._lay_out()
         self._connect()
         self.setAcceptDrops(True)
@@ -66,6 +68,8 @@ class RunsScreen(QWidget):
         if old is None or state.rows is not old.rows or state.selected != old.selected:
             self._table.show_rows(state.rows, state.selected)
         self._table.show_order(state.sorted_by, descending=state.descending)
+        self._trash.setChecked(state.in_trash)
+        self._import.setEnabled(not state.in_trash)
         self._show_middle(state)
         if old is None or state.overlay is not old.overlay:
             self._preview.show_overlay(state.overlay)
@@ -119,6 +123,16 @@ class RunsScreen(QWidget):
         dialog.filesSelected.connect(self._take_files)
         dialog.open()
 
+    def _ask_to_empty(self) -> None:
+        count = self._presenter.state.total
+        text = ngettext("Delete {count} run for ever?", "Delete {count} runs for ever?", count)
+        detail = gettext(
+            "The trash of {folder} is emptied. Nothing brings a deleted run back.",
+            folder=self._presenter.state.folder,
+        )
+        delete = ngettext("Delete {count} run", "Delete {count} runs", count)
+        ask(self, text, detail, delete, self._presenter.empty_trash)
+
     def _show_middle(self, state: RunsState) -> None:
         count = ngettext("{count} run", "{count} runs", state.total)
         if state.filter != RunFilter():
@@ -141,6 +155,8 @@ class RunsScreen(QWidget):
     def _connect(self) -> None:
         for changed in (self._text.textChanged, self._series.activated, self._status.activated):
             changed.connect(lambda _: self._apply_filter())
+        self._trash.clicked.connect(self._presenter.show_trash)
+        bind_button(self._trash, "Ctrl+T", gettext("Runs in the trash, or those of the folder again"), self)
         bind_button(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
         self._table.selected.connect(self._presenter.select)
         self._table.sort_requested.connect(self._presenter.sort_by)
@@ -159,7 +175,14 @@ class RunsScreen(QWidget):
         self._series.setAccessibleName(gettext("Series"))
         self._status.setAccessibleName(gettext("Which runs"))
         top = make_row(
-            (self._text, 1), self._series, self._status, self._count, self._import, self._folder, spacing=8
+            (self._text, 1),
+            self._series,
+            self._status,
+            self._count,
+            self._import,
+            self._folder,
+            self._trash,
+            spacing=8,
         )
         self._middle.addWidget(self._table)
         self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -172,6 +195,8 @@ class RunsScreen(QWidget):
 def _empty_text(state: RunsState) -> str:
     if not state.is_listed:
         return gettext("Looking into the folder")
+    if state.in_trash and not state.total:
+        return gettext("The trash of {folder} is empty.", folder=state.folder)
     if state.total:
         return gettext("No run is like that. Change the words above, or choose All runs.")
     return gettext(

@@ -27,8 +27,8 @@ from app.acquisition.messages import Failed, PortSettings
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.navigator import ConnectForm
-from app.presenters.record.state import Action
 from app.presenters.recent import RecentItems
+from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.presenters.start_screen import PortChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter
