@@ -24,6 +24,7 @@ from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.report import ReportPresenter
 from app.presenters.navigator import ConnectForm, StandContext
 from app.presenters.recent import RecentItems
 from app.presenters.record.presenter import RecordPresenter
@@ -103,7 +104,7 @@ class WindowPresenter(Presenter[WindowState]):
         runs, batch = pool.make_worker(), pool.make_worker()
         self.start = StartPresenter(context.start, self, context.list_ports, self._recent)
         self.record = RecordPresenter(connection, stand, pool.make_worker(), author)
-        self.identify = IdentifyPresenter(analysis)
+        self.identify = IdentifyPresenter(analysis, ReportPresenter(pool.make_worker(), self._recent))
         self.gauges = GaugesPresenter(pool.make_worker(), pool.make_worker(), stand.gauges, self)
         connection.add_row_listener(self.gauges.on_rows)
         self.stand = StandPresenter(

@@ -1,6 +1,7 @@
 """The main window: side bar, notice, and the screens, each built when first shown."""
 
 import importlib
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
@@ -113,10 +114,17 @@ class MainWindow(KeyboardWindow):
         self._find.look()
 
     def ask_for_export(self) -> None:
+        """Export the runs that are selected on Runs."""
+        if self._presenter.runs.open_export():
+            self._show_export()
+
+    def export_run(self, path: str) -> None:
+        self._presenter.runs.export_dialog.open((path,), str(Path(path).parent))
+        self._show_export()
+
+    def _show_export(self) -> None:
         from app.qt.runs.export_dialog import ExportDialog
 
-        if not self._presenter.runs.open_export():
-            return
         if self._export is None:
             self._export = ExportDialog(self._presenter.runs.export_dialog, self)
             self._presenter.runs.export_dialog.attach(self._export)
@@ -167,7 +175,11 @@ class MainWindow(KeyboardWindow):
     def _build_screen(self, screen: Screen) -> QWidget:
         """Build the view of a screen; one in a folder is imported now, since its plots load pyqtgraph."""
         window, presenter = self._presenter, self._presenter.presenters[screen]
-        links = {Screen.RECORD: window.show_start, Screen.IDENTIFY: self.ask_for_run, Screen.RUNS: self}
+        links: dict[Screen, tuple[Any, ...]] = {
+            Screen.RECORD: (window.show_start,),
+            Screen.IDENTIFY: (self.ask_for_run, self.export_run),
+            Screen.RUNS: (self,),
+        }
         view: Any
         match screen:
             case Screen.START:
@@ -178,7 +190,7 @@ class MainWindow(KeyboardWindow):
                 view = SettingsScreen(window.settings)
             case _:
                 module = importlib.import_module(f"app.qt.{screen}.screen")
-                more = (links[screen],) if screen in links else ()
+                more = links.get(screen, ())
                 view = getattr(module, f"{screen.capitalize()}Screen")(self._theme, presenter, *more)
         presenter.attach(view)
         return cast(QWidget, view)
