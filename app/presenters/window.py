@@ -49,14 +49,18 @@ else:
     analysis_task = LazyModule("app.presenters.analysis_task")
 
 
+NAME = "Slipstand"
+
+
 @dataclass(frozen=True, slots=True)
 class WindowState:
-    """Shown screen, notice above it, theme (`system`, `light`, `dark`); the window ends if `is_closing`."""
+    """Shown screen, notice above it, theme (`system`, `light`, `dark`), title; the window ends if `is_closing`."""
 
     screen: Screen = Screen.START
     notice: Notice | None = None
     theme: str = "system"
     is_closing: bool = False
+    title: str = NAME
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,6 +244,7 @@ class WindowPresenter(Presenter[WindowState]):
         for presenter in self.presenters.values():
             presenter.tick()
         self._analysis.poll()
+        self._update(title=self._title())
 
     def close(self) -> None:
         self._connection.close()
@@ -247,6 +252,13 @@ class WindowPresenter(Presenter[WindowState]):
         for presenter in self.presenters.values():
             presenter.close()
         self._pool.close()
+
+    def _title(self) -> str:
+        """Run, device and state of the recording; on Identify the run that is shown there."""
+        parts, shown = self.record.state.title, Path(self.identify.state.title).stem
+        if self.state.screen is Screen.IDENTIFY and shown not in ("", *parts):
+            parts = (shown, *parts)
+        return " \u2013 ".join((*parts, NAME))
 
     def _apply_settings(self, settings: Settings) -> None:
         self.record.dispatch(settings)

@@ -22,6 +22,7 @@ from app.presenters.base import Notice
 from app.presenters.screens import Screen
 from app.presenters.window import WindowPresenter, WindowState
 from app.qt.keyboard import KeyboardWindow
+from app.qt.menu import fill_menu
 from app.qt.settings_screen import SettingsScreen
 from app.qt.stand_screen import StandScreen
 from app.qt.start_screen import StartScreen
@@ -62,11 +63,11 @@ class MainWindow(KeyboardWindow):
         self._stack = QStackedWidget()
         self._notice = NoticeBar(presenter)
         self._rail = {screen: self._rail_button(screen) for screen in Screen}
+        self._menu = self._menu_button()
         self._lay_out()
         self._add_keys()
         theme.changed.connect(self._restyle)
         self._restyle()
-        self.setWindowTitle("Slipstand")
         self.setMinimumSize(self._geometry.within_screen(_SMALLEST))
         self._geometry.restore_window(self)
         presenter.attach(self)
@@ -87,6 +88,7 @@ class MainWindow(KeyboardWindow):
         self._notice.show_notice(state.notice)
         if state.is_closing and not old.is_closing:
             QTimer.singleShot(0, self, self.close)
+        self.setWindowTitle(state.title)
 
     def home(self) -> QWidget | None:
         return self._stack.currentWidget()
@@ -195,17 +197,16 @@ class MainWindow(KeyboardWindow):
         presenter.attach(view)
         return cast(QWidget, view)
 
+    def _menu_button(self) -> QToolButton:
+        button = _make_rail_button(gettext("Menu"))
+        fill_menu(button, self, self.show_help)
+        bind_button(button, "F10", gettext("About, documentation, log"), self)
+        return button
+
     def _rail_button(self, screen: Screen) -> QToolButton:
-        button = QToolButton()
-        button.setProperty("role", "rail")
-        button.setText(gettext(screen.label))
-        button.setFont(font(TextRole.LABEL))
+        button = _make_rail_button(gettext(screen.label))
         button.setCheckable(True)
         button.setAutoExclusive(True)
-        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
-        button.setIconSize(QSize(24, 24))
-        button.setFixedWidth(72)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         button.clicked.connect(lambda: self._presenter.show_screen(screen))
         return button
 
@@ -216,21 +217,35 @@ class MainWindow(KeyboardWindow):
             bind_button(button, key, gettext(screen.label), self)
         add_shortcut(self, "Ctrl+O", gettext("Open a recording"), self.ask_for_run)
         add_shortcut(self, "F1", gettext("Show these keys"), self.show_help)
+        add_shortcut(self, "Ctrl+Q", gettext("Close the window and end the program"), self.close)
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
         for screen, button in self._rail.items():
             button.setIcon(icon(screen.icon, tokens.muted, active=tokens.accent))
+        self._menu.setIcon(icon("list", tokens.muted))
 
     def _lay_out(self) -> None:
         rail, middle = QFrame(), QWidget()
         rail.setProperty("role", "rail")
         at_top = [button for screen, button in self._rail.items() if screen not in _AT_FOOT]
         at_foot = [self._rail[screen] for screen in _AT_FOOT]
-        make_column(*at_top, STRETCH, *at_foot, spacing=4, margins=(8, 8), of=rail)
+        make_column(*at_top, STRETCH, *at_foot, self._menu, spacing=4, margins=(8, 8), of=rail)
         content = make_column(self._notice, (self._stack, 1))
         make_row(rail, (content, 1), of=middle)
         self.setCentralWidget(middle)
+
+
+def _make_rail_button(text: str) -> QToolButton:
+    button = QToolButton()
+    button.setProperty("role", "rail")
+    button.setText(text)
+    button.setFont(font(TextRole.LABEL))
+    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
+    button.setIconSize(QSize(24, 24))
+    button.setFixedWidth(72)
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    return button
 
 
 _WORDS = {"bad": N_("Error"), "warn": N_("Note"), "ok": N_("Done"), "plain": ""}

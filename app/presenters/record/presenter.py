@@ -169,7 +169,28 @@ def record_state(model: RecordModel) -> state.RecordState:
         primary=primary if primary in allowed and not (ended and ended.is_awaited) else None,
         disarms=session.disarms,
         connected=session.engine is not None,
+        title=_title(model),
     )
+
+
+def _title(model: RecordModel) -> tuple[str, ...]:
+    session, run = model.session, model.ended.run if model.ended else model.session.run
+    name = run.name if model.is_run_shown else ""
+    if session.engine is None:
+        state_text = ""
+    elif session.loss_reason:
+        state_text = gettext("device lost")
+    elif session.engine is PullbackState.CONNECTING:
+        state_text = gettext("connecting")
+    elif session.is_idle:
+        state_text = gettext("ready")
+    else:
+        state_text = gettext("recording: {step}", step=_step_name(session.engine))
+    return tuple(filter(None, (name, session.device, state_text)))
+
+
+def _step_name(engine: PullbackState) -> str:
+    return next((gettext(name) for name, states in _STEPS if engine in states), "")
 
 
 def _guidance(model: RecordModel) -> state.GuidanceState:

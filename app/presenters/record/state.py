@@ -230,6 +230,8 @@ class RecordState:
     disarms: bool = False
     """`Action.STOP` keeps no run, since the table has not been pulled back."""
     connected: bool = False
+    title: tuple[str, ...] = ()
+    """Run, device and state of the recording, as far as there are any."""
 
 
 @dataclass(frozen=True, slots=True)

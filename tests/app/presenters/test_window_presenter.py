@@ -19,7 +19,7 @@ from stage import (
     standing,
 )
 
-from app.acquisition.messages import EndReason, Failed, PortSettings, StateChanged
+from app.acquisition.messages import EndReason, Failed, PortSettings, Reconnecting, StateChanged
 from app.presenters.base import NoticeAction, Progress, Tone
 from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReporter
@@ -379,3 +379,25 @@ def test_recorded_and_opened_runs_are_recent_until_they_are_gone(desk: Desk) -> 
     assert desk.recent.runs == (RUN, "/recordings/a.h5")
     desk.worker.calls[0].fail("there is no such run")
     assert desk.recent.runs == (RUN,)
+
+
+def test_the_title_follows_run_device_and_state(desk: Desk) -> None:
+    def title() -> str:
+        desk.window.tick()
+        return desk.window.state.title
+
+    assert title() == "Slipstand"
+    desk.window.start.start_simulation()
+    assert desk.window.record.state.title == ("Simulated stand", "connecting")
+    desk.tick_until_connected()
+    assert title() == "Slipstand simulator \u2013 ready \u2013 Slipstand"
+    desk.window.record.dispatch(Action.ARM)
+    desk.play(3.0)
+    assert title() == "20260112_1FFM0_001 \u2013 Slipstand simulator \u2013 recording: Pull \u2013 Slipstand"
+    desk.play(END_S + 0.1)
+    desk.window.show_screen(Screen.IDENTIFY)
+    assert title() == "20260112_1FFM0_001 \u2013 Slipstand simulator \u2013 ready \u2013 Slipstand"
+    desk.window.open_run("/recordings/other.h5")
+    assert title().startswith("other \u2013 20260112_1FFM0_001 \u2013 ")
+    desk.launcher.engines[-1].say(Reconnecting("COM7 is gone"))
+    assert "device lost" in title()
