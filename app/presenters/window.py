@@ -211,6 +211,10 @@ class WindowPresenter(Presenter[WindowState]):
     def show_start(self) -> None:
         self.show_screen(Screen.START)
 
+    def connect_device(self, form: ConnectForm) -> None:
+        self.start.set_form(form)
+        self.start.connect()
+
     def fill_connection(self, form: ConnectForm) -> None:
         self.start.set_form(form)
         self.show_screen(Screen.START)

@@ -7,7 +7,6 @@ from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailu
 from app.presenters.gauges.state import PortCard, PortsState
 from app.presenters.navigator import ConnectForm, Navigator
 from app.presenters.results import sentence
-from app.presenters.start_screen import port_settings
 from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext
 
@@ -57,7 +56,7 @@ class PortsPresenter(Presenter[PortsState]):
         form = self._suggested_form(url)
         if form is not None:
             self.cancel()
-            self._navigator.open_port(port_settings(form))
+            self._navigator.connect_device(form)
 
     def fill_port(self, url: str) -> None:
         form = self._suggested_form(url)

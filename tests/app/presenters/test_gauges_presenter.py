@@ -11,7 +11,7 @@ from ring_kit import ring_rows
 from stage import Call, FakeWorker
 
 from app.acquisition.averaged_counts import MAX_WINDOWS, NoAverageError, RecentSamples, average_counts
-from app.acquisition.messages import Connected, PortSettings
+from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import LabelledValue, Progress, Tone
 from app.presenters.gauges.presenter import GaugesPresenter, gauge_cards
@@ -61,8 +61,8 @@ class Desk:
     def fill_second_port(self, url: str) -> None:
         self.went.append(url)
 
-    def open_port(self, port: PortSettings) -> None:
-        self.went.append(port)
+    def connect_device(self, form: ConnectForm) -> None:
+        self.went.append(("connect", form))
 
     def reconnect(self) -> None:
         self.went.append("again")
@@ -224,10 +224,11 @@ def test_ports_are_listed_and_probed_without_sending_unless_asked(desk: Desk) ->
 
 def test_what_was_found_is_connected_as_it_was_found(desk: Desk) -> None:
     desk.presenter.ports.probe()
-    desk.prober.calls[-1].done((PortCard("COM7", suggested_form=ConnectForm("COM7", "csv", "9600")),))
+    form = ConnectForm("COM7", "csv", "9600")
+    desk.prober.calls[-1].done((PortCard("COM7", suggested_form=form),))
     desk.presenter.ports.connect("COM8")
     desk.presenter.ports.connect("COM7")
-    assert desk.went == [PortSettings("COM7", "csv", 9600, "N", 1)]
+    assert desk.went == [("connect", form)]
 
 
 def test_looking_can_be_given_up(desk: Desk) -> None:
