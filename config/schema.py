@@ -36,6 +36,14 @@ class SeriesError(ConfigError, ValueError):
     """A series code that is not one of this stand."""
 
 
+_CODES = {
+    "pullbacks_m": (r"\d", N_("a digit, such as 1")),
+    "contacts": (r"[A-Z]+", N_("capital letters, such as FF")),
+    "added_masses_kg": (r"M\d+", N_("M and a number, such as M0")),
+}
+"""Form of the three parts of a series code, and that form in words."""
+
+
 class _Checked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Base of all settings: immutable, unknown keys refused, `replace` checks again."""
 
@@ -86,6 +94,20 @@ class Stand(_Checked, frozen=True):
         self._check(_POSITIVE, "table_mass_kg", "plate_mass_kg", "gravity_m_per_s2", "pullbacks_m")
         self._check(_NOT_NEGATIVE, "table_mass_standard_uncertainty_kg", "plate_mass_standard_uncertainty_kg")
         self._check(_NOT_NEGATIVE, "gravity_standard_uncertainty_m_per_s2", "added_masses_kg")
+
+    def check_codes(self) -> None:
+        """Check that its alphabets make series codes. Raises ConfigError.
+
+        A run that holds such a stand can still be read.
+        """
+        for name, (form, words) in _CODES.items():
+            codes = list(getattr(self, name))
+            if not codes:
+                raise ConfigError("{name} is empty: a series needs one", name=name)
+            for code in codes:
+                if re.fullmatch(form, code) is None:
+                    template = N_("{name}: code {code!r} makes no series code: write {words}")
+                    raise ConfigError(template, name=name, code=code, words=message(words))
 
     @property
     def all_series(self) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ from enum import Enum, StrEnum
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
-from config.schema import Gauges
+from config.schema import Gauges, Stand
 from messages.i18n import N_, gettext, ngettext
 from messages.message import Message
 
@@ -44,6 +44,9 @@ class Presenter(Generic[State]):
 
     def on_gauges(self, gauges: Gauges) -> None:
         """React to other calibrations being in use."""
+
+    def on_stand(self, stand: Stand) -> None:
+        """React to another stand being in use."""
 
     def close(self) -> None:
         """End the workers."""

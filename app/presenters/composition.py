@@ -67,6 +67,7 @@ def make_window_presenter(
             _list_ports,
             lambda: sum(len(unfinished_journals(folder)) for folder in journal_folders(context.directory)),
             _read_recent(errors),
+            files.save_stand,
         ),
         errors,
     )

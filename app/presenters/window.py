@@ -36,10 +36,11 @@ from app.presenters.runs.state import RunFilter
 from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
 from app.presenters.stand_screen import StandPresenter
+from app.presenters.stand_settings import StandSettingsPresenter
 from app.presenters.start_screen import PortChoice, StartPresenter, StartState
 from app.presenters.worker import LazyModule, Worker, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
-from config.schema import Gauges, Settings
+from config.schema import Gauges, Settings, Stand
 from messages.i18n import N_, gettext
 from messages.message import Message
 
@@ -54,7 +55,7 @@ NAME = "Slipstand"
 
 @dataclass(frozen=True, slots=True)
 class WindowState:
-    """Shown screen, notice above it, theme (`system`, `light`, `dark`), title; the window ends if `is_closing`."""
+    """Shown screen, notice above it, theme (`system`, `light`, `dark`), title; `is_closing` ends it."""
 
     screen: Screen = Screen.START
     notice: Notice | None = None
@@ -73,6 +74,8 @@ class WindowContext:
     count_unfinished: Callable[[], int] = lambda: 0
     """Number of runs in the folder that a crash has left unfinished."""
     recent: RecentItems = field(default_factory=RecentItems)
+    save_stand: Callable[[Stand], Path] = lambda _: Path()
+    """Stores another stand, and returns its file. Raises ConfigError."""
 
 
 class WindowPresenter(Presenter[WindowState]):
@@ -121,6 +124,9 @@ class WindowPresenter(Presenter[WindowState]):
             pool.make_worker(), self._folder, stand.all_series, author, self, self._recent
         )
         self.settings = SettingsPresenter(context.personal, self._apply_settings)
+        self.stand_settings = StandSettingsPresenter(
+            stand.stand, context.save_stand, self._apply_stand, lambda: self.record.is_recording
+        )
         self.presenters: dict[Screen, Presenter[Any]] = {screen: getattr(self, screen) for screen in Screen}
         self._apply_settings(context.personal.settings)
         if context.personal.fault:
@@ -269,6 +275,13 @@ class WindowPresenter(Presenter[WindowState]):
         self.runs.set_author(settings.operator or getpass.getuser())
         self.campaign.set_author(settings.operator or getpass.getuser())
         self._update(theme=settings.theme)
+
+    def _apply_stand(self, stand: Stand) -> None:
+        for presenter in self.presenters.values():
+            presenter.on_stand(stand)
+        if self._connection.is_active:
+            text = gettext("The stand has changed. Connect again, so that runs are recorded with it")
+            self._update(notice=Notice(text, Tone.WARN, NoticeAction.RECONNECT))
 
     def _connect(
         self, device: str, waiting_for: str, open_it: Callable[[], None], port: PortSettings | None = None

@@ -1,5 +1,7 @@
 """View of the Settings screen: look, recording, and the files of the other settings."""
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QPushButton, QWidget
@@ -31,7 +33,9 @@ _WIDTH = 760
 
 
 class SettingsScreen(QWidget):
-    def __init__(self, presenter: SettingsPresenter) -> None:
+    """Draws `SettingsState`; `edit_stand` opens the settings of the stand."""
+
+    def __init__(self, presenter: SettingsPresenter, edit_stand: Callable[[], None] = lambda: None) -> None:
         super().__init__()
         self._presenter = presenter
         self._choices = {name: self._choice(name) for name in CHOICES}
@@ -40,6 +44,7 @@ class SettingsScreen(QWidget):
         self._recordings.setPlaceholderText(presenter.personal.recordings)
         self._sounds = CheckBox(gettext("Sound at each state of a pullback"))
         self._connects = CheckBox(gettext("Connect to the last amplifier at the start"))
+        self._stand = make_button(gettext("Edit the stand…"), edit_stand)
         self._undo = make_button(gettext("Undo"), presenter.undo)
         self._message = label(wrap=True)
         self._waits = label(wrap=True)
@@ -50,6 +55,8 @@ class SettingsScreen(QWidget):
         self._recordings.editingFinished.connect(self._write_folder)
         self._sounds.clicked.connect(lambda checked: presenter.change(sounds=checked))
         self._connects.clicked.connect(lambda checked: presenter.change(connect_at_start=checked))
+        words = gettext("Masses, pullbacks, contacts and added masses of the stand")
+        bind_button(self._stand, "Alt+E", words, self)
         bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
 
     def show_state(self, state: SettingsState) -> None:
@@ -126,7 +133,7 @@ class SettingsScreen(QWidget):
             files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
             files.addWidget(_open_button(file), row, 2)
         log = make_form_grid(((gettext("Log"), self._choices["log_level"]),), wide=False)
-        return _card(gettext("Files"), hint, files, log)
+        return _card(gettext("Files"), hint, files, make_row(self._stand, STRETCH), log)
 
 
 def _card(title: str, hint: str, *parts: Item) -> QFrame:

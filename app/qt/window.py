@@ -57,6 +57,7 @@ class MainWindow(KeyboardWindow):
         self._shown = presenter.state
         self._screens: dict[Screen, QWidget] = {}
         self._find: FindDialog | None = None
+        self._stand: QDialog | None = None
         self._export: QDialog | None = None
         self._import: QDialog | None = None
         self._help: QDialog | None = None
@@ -142,6 +143,15 @@ class MainWindow(KeyboardWindow):
         self._import.show()
         self._import.raise_()
 
+    def edit_stand(self) -> None:
+        from app.qt.stand_settings_dialog import StandSettingsDialog
+
+        if self._stand is None:
+            self._stand = StandSettingsDialog(self._presenter.stand_settings, self)
+            self._presenter.stand_settings.attach(self._stand)
+        self._stand.show()
+        self._stand.raise_()
+
     def show_help(self) -> None:
         if self._help is not None:
             self._help.close()
@@ -189,7 +199,7 @@ class MainWindow(KeyboardWindow):
             case Screen.STAND:
                 view = StandScreen(window.stand)
             case Screen.SETTINGS:
-                view = SettingsScreen(window.settings)
+                view = SettingsScreen(window.settings, self.edit_stand)
             case _:
                 module = importlib.import_module(f"app.qt.{screen}.screen")
                 more = links.get(screen, ())

@@ -17,6 +17,7 @@ from app.presenters.navigator import Navigator
 from app.presenters.recent import RecentItems
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
+from config.schema import Stand
 from messages.i18n import gettext, ngettext
 
 if TYPE_CHECKING:
@@ -54,6 +55,10 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def refresh(self) -> None:
         self._collect(save=False)
+
+    def on_stand(self, stand: Stand) -> None:
+        self._all_series = stand.all_series
+        self._set_state(self._empty_state(self.state.folder))  # gathered anew when the screen is shown
 
     def set_author(self, name: str) -> None:
         self._author = name

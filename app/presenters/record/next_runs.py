@@ -67,6 +67,11 @@ class NextRuns:
         choices = replace(self.choices, **changes)
         return replace(self, choices=replace(choices, summary=form_summary(choices.form)))
 
+    def with_all_series(self, all_series: tuple[str, ...]) -> "NextRuns":
+        """Offer other series; the chosen one stays while it is among them. The plan stays as it is."""
+        series = self.series if self.series in all_series else all_series[0]
+        return self.with_choices(all_series=all_series, series=series)
+
     def with_form(self, form: RunForm) -> "NextRuns":
         """Take an edited form; its error is in `choices.form_error`."""
         return replace(self, is_edited=True).with_choices(form=form, form_error=_form_error(form))

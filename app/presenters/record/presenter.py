@@ -16,7 +16,7 @@ from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import Action, Cue, TaskDone, TaskFailed
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
-from config.schema import Gauges
+from config.schema import Gauges, Stand
 from messages.i18n import N_, gettext, translate
 
 if TYPE_CHECKING:
@@ -119,6 +119,9 @@ class RecordPresenter(Presenter[state.RecordState]):
 
     def on_gauges(self, gauges: Gauges) -> None:
         self.dispatch(gauges)
+
+    def on_stand(self, stand: Stand) -> None:
+        self.dispatch(stand)
 
     def close(self) -> None:
         """Wait until decisions are stored, then end the worker."""

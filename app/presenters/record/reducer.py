@@ -24,7 +24,7 @@ from app.presenters.record.model import (
 from app.presenters.record.next_runs import NextRuns
 from app.presenters.record.state import Action, AnalysisFailed, AnalysisProgress, TaskDone, TaskFailed
 from app.presenters.results import Result, sentence
-from config.schema import Gauges, Settings
+from config.schema import Gauges, Settings, Stand
 from messages.i18n import gettext, ngettext
 from messages.message import Message
 
@@ -107,6 +107,9 @@ class _Reduction:
                 self._set(sounds=event.sounds, next_runs=next_runs)
             case Gauges():
                 self._set(stand=replace(model.stand, gauges=event), monitors=monitors_of(event))
+            case Stand():
+                stand = replace(model.stand, stand=event, all_series=event.all_series)
+                self._set(stand=stand, next_runs=model.next_runs.with_all_series(event.all_series))
             case state.Notification.RUNS_CHANGED:
                 self._count_completed()
             case _:

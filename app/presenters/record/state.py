@@ -11,7 +11,7 @@ from app.presenters.base import EMPTY_CHIP, Chip, Progress, SimulationStarted, T
 from app.presenters.decimated_history import Polyline
 from app.presenters.results import Result, ResultRow
 from app.runs.next_tests import NextTests
-from config.schema import Gauges, Settings
+from config.schema import Gauges, Settings, Stand
 from messages.i18n import N_, gettext
 from messages.message import Message
 
@@ -378,10 +378,11 @@ RecordEvent = (
     | AnalysedRun
     | Settings
     | Gauges
+    | Stand
     | TaskDone
     | TaskFailed
     | AnalysisProgress
     | AnalysisFailed
     | Event
 )
-"""Settings, calibrations, an edited form, an identified run and new samples are events by themselves."""
+"""Settings, calibrations, the stand, an edited form, an analysed run and samples are events by themselves."""

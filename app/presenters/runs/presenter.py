@@ -25,6 +25,7 @@ from app.presenters.runs.state import (
 )
 from app.presenters.runs.table import RunList
 from app.presenters.worker import LazyModule, Worker
+from config.schema import Stand
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
@@ -82,6 +83,9 @@ class RunsPresenter(Presenter[RunsState]):
                 failed=self._on_listing_failed,
                 progress=self._set_progress,
             )
+
+    def on_stand(self, stand: Stand) -> None:
+        self._update(all_series=stand.all_series)
 
     def set_author(self, name: str) -> None:
         self._author = name

@@ -80,9 +80,10 @@ class RunBar(QFrame):
         self._connect()
 
     def show_choices(self, choices: RunChoices, plan: PlanState) -> None:
-        self._shown = choices
-        if self._series.count() != len(choices.all_series):
+        if choices.all_series != self._shown.all_series:
+            self._series.clear()
             self._series.addItems(choices.all_series)
+        self._shown = choices
         self._series.setCurrentText(choices.series)
         choosable = choices.editable and not choices.series_fixed
         self._series.setEnabled(choosable)

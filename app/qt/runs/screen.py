@@ -62,7 +62,9 @@ class RunsScreen(QWidget):
     def show_state(self, state: RunsState) -> None:
         old, self._shown = self._shown, state
         if old is None or state.all_series != old.all_series:
+            self._series.clear()
             self._series.addItems([gettext(_ALL_SERIES), *state.all_series])
+            self._show_wanted(state.filter)
         if old is not None and state.filter != old.filter:
             self._show_wanted(state.filter)
         if old is None or state.rows is not old.rows or state.selected != old.selected:

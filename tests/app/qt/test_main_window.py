@@ -35,6 +35,7 @@ from app.presenters.window import WindowContext, WindowPresenter
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.widgets.shortcuts import HelpDialog
 from app.qt.window import MainWindow
+from config.files import save_stand
 from config.schema import RecentUse, WindowLayout
 from drivers.driver import DeviceDriver
 
@@ -74,6 +75,7 @@ class Desk:
                 list_ports=lambda: (PortChoice("COM7", "FT232R"),),
                 count_unfinished=lambda: self.unfinished,
                 recent=RecentItems(recent),
+                save_stand=save_stand,
             ),
             self.faults,
         )
