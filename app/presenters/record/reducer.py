@@ -129,6 +129,8 @@ class _Reduction:
         match action:
             case Action.UNDO if model.undo_text:
                 self._undo()
+            case Action.UNDO_PLAN:
+                self._save(model.next_runs.with_plan_undone())
             case Action.UNTARE if Action.TARE in model.allowed:
                 self._set(live=model.live.untared())
                 self._forget_last()

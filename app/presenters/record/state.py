@@ -173,6 +173,7 @@ class PlanState:
     progress: tuple[SeriesProgress, ...] = ()
     text: str = ""
     error: str = ""
+    can_undo: bool = False
 
     @property
     def planned(self) -> int:
@@ -195,6 +196,7 @@ class Action(StrEnum):
     REPEAT = "repeat"  # move the run to the trash and record the same series again
     DISCARD = "discard"
     UNDO = "undo"
+    UNDO_PLAN = "undo-plan"  # take the last change of the plan back
 
 
 class Cue(StrEnum):

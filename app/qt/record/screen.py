@@ -75,7 +75,7 @@ class RecordScreen(QWidget):
         if old is None or (state.choices, state.plan) != (old.choices, old.plan):
             self._bar.show_choices(state.choices, state.plan)
             if self._plan is not None:
-                self._plan.show_plan(state.plan)
+                self._plan.show_plan(state.plan, state.choices.series)
         if old is None or (state.status_message, state.undo) != (old.status_message, old.undo):
             self._status_line.show_status(state.status_message, state.undo)
         if old is None or _actions(state) != _actions(old):
@@ -107,7 +107,7 @@ class RecordScreen(QWidget):
         if self._plan is None:
             self._plan = PlanDialog(self._presenter, self)
         if self._shown is not None:
-            self._plan.open_with(self._shown.plan)
+            self._plan.open_with(self._shown.plan, self._shown.choices.series)
 
     def _show_result(self, result: Result | None) -> None:
         if result is not None:

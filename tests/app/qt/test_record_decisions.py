@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import (
     END_S,
@@ -43,7 +43,6 @@ from app.presenters.record.state import (
 from app.qt.keyboard import KeyboardWindow
 from app.qt.record import sound
 from app.qt.record.panels import Stepper, TargetBar
-from app.qt.record.plan_dialog import PlanDialog
 from app.qt.record.run_bar import PlanStrip
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
@@ -75,7 +74,8 @@ class Stage:
         self.window.resize(1188, 800)
         self.presenter.attach(self.screen)
         self.window.show()
-        qtbot.waitExposed(self.window)
+        self.window.activateWindow()
+        qtbot.waitUntil(self.window.isActiveWindow)
         self.presenter.dispatch(Connecting("COM7"))
         done = (("/a", "1FFM0"), ("/b", "1FFM0"), ("/c", "1FFM0"), ("/d", "1FFM1"))
         self.answer(LoadPlan("/recordings"), LoadedPlan(KEPT, done))
@@ -333,24 +333,6 @@ def test_as_much_of_the_plan_is_shown_as_fits(stage: Stage) -> None:
         assert "1FFM1  ●○○" in stage.words()
     assert counts == sorted(counts)
     assert counts[0] < counts[-1]
-
-
-def test_the_plan_is_edited_beside_the_window(stage: Stage) -> None:
-    stage.press(Qt.Key.Key_P)
-    (dialog,) = stage.screen.findChildren(PlanDialog)
-    assert not dialog.isModal()
-    assert "4 of 108 runs are there" in visible_words(dialog)
-    text = dialog.findChild(QPlainTextEdit)
-    assert isinstance(text, QPlainTextEdit)
-    text.setPlainText("4FFM0 x3")
-    use = next(button for button in dialog.findChildren(QPushButton) if button.text() == "Use this plan")
-    use.click()
-    assert dialog.isVisible()
-    assert "4FFM0 is no series of this stand" in visible_words(dialog)
-    text.setPlainText("1FFM0 x4")
-    use.click()
-    assert not dialog.isVisible()
-    assert "1FFM0  ●●●○" in stage.words()
 
 
 def test_what_is_known_of_the_next_tests_is_folded_into_a_line(stage: Stage) -> None:
