@@ -39,6 +39,8 @@ class StartState:
     busy: str = ""
     connected: str = ""
     last_device: str = ""
+    last_form: ConnectForm | None = None
+    """Form that connects to the last amplifier."""
     runs: tuple[str, ...] = ()
 
     @property
@@ -114,9 +116,12 @@ class StartPresenter(Presenter[StartState]):
         self._update(connected=device, busy="")
 
     def _show_recent(self) -> None:
-        device = self._recent.device
-        last = "" if device is None else gettext("{device} on {port}", device=device.name, port=device.port)
-        self._update(last_device=last, runs=self._recent.runs)
+        device, runs = self._recent.device, self._recent.runs
+        if device is None:
+            self._update(last_device="", last_form=None, runs=runs)
+            return
+        last = gettext("{device} on {port}", device=device.name, port=device.port)
+        self._update(last_device=last, last_form=_recent_form(device), runs=runs)
 
 
 def port_settings(form: ConnectForm) -> PortSettings:

@@ -3,6 +3,7 @@
 from PySide6.QtWidgets import QDialog, QWidget
 
 from app.presenters.gauges.ports import PortsPresenter
+from app.presenters.gauges.state import PortsState
 from app.qt.gauges.ports_panel import PortsPanel
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import make_button
@@ -17,10 +18,12 @@ class FindDialog(QDialog):
     def __init__(self, presenter: PortsPresenter, parent: QWidget) -> None:
         super().__init__(parent)
         self._presenter = presenter
-        panel = PortsPanel(presenter)
+        self._is_probing = False
+        panel = self._panel = PortsPanel(presenter)
         panel.add_keys(self)
         panel.chosen.connect(self.close)
         presenter.attach(panel)
+        presenter.attach(self)
         self.finished.connect(presenter.cancel)
         title = label(gettext("Find my amplifier"), TextRole.HEADING)
         title.setContentsMargins(16, 12, 16, 0)
@@ -28,6 +31,12 @@ class FindDialog(QDialog):
         make_column(title, (panel, 1), foot, spacing=8, of=self)
         self.setWindowTitle(gettext("Find my amplifier"))
         self.resize(*_SIZE)
+
+    def show_state(self, state: PortsState) -> None:
+        """Focus what can be connected once all ports were looked at, so that Enter connects it."""
+        if self._is_probing and not state.progress:
+            self._panel.focus_found()
+        self._is_probing = bool(state.progress)
 
     def look(self) -> None:
         """Show the dialog, and look at the ports."""

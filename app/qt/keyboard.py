@@ -1,7 +1,7 @@
 """Keyboard rules of the window: Enter presses the focused button, and the focus never moves by itself."""
 
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QKeyEvent
+from PySide6.QtGui import QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton, QToolButton, QWidget
 
 _ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
@@ -23,6 +23,12 @@ class KeyboardWindow(QMainWindow):
         home = self.home()
         if home is not None:
             getattr(home, "take_focus", home.setFocus)()
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
+        """Choose the focus at the start, which Qt would give to the first button."""
+        super().showEvent(event)
+        if not event.spontaneous():
+            self.focus_home()
 
     def event(self, event: QEvent) -> bool:
         """Let Enter press the focused button, even where it is a shortcut of the screen."""

@@ -105,12 +105,12 @@ class StartScreen(QWidget):
         )
         cards.addStrut(_CARD_HEIGHT)
         motto = gettext("Pull the table back, let go, read the friction coefficient.")
-        title = _centred("Slipstand", TextRole.INSTRUCTION)
+        title = _centred("Slipstand", TextRole.NUMBER)
         status = make_row(STRETCH, self._status, self._disconnect, STRETCH, spacing=12)
         page = QWidget()
-        layout = make_column(STRETCH, title, spacing=16, margins=(24, 24), of=page)
+        layout = make_column(STRETCH, title, spacing=12, margins=(24, 16), of=page)
         layout.addWidget(_centred(motto, TextRole.HEADING))
-        layout.addSpacing(16)
+        layout.addSpacing(4)
         layout.addLayout(cards)
         layout.addLayout(status)
         layout.addStretch(2)
@@ -120,17 +120,17 @@ class StartScreen(QWidget):
         hint = gettext("No amplifier needed: a stand is simulated and read through a port like a real one.")
         series = make_form_grid([(gettext("Series"), self._series)])
         self._series.setAccessibleName(gettext("Series of the simulated stand"))
-        return _card(gettext("Simulated stand"), hint, series, STRETCH, self._try)
+        return _card(gettext("Simulated stand"), hint, series, self._try, STRETCH)
 
     def _amplifier_card(self) -> QFrame:
         hint = gettext("Both gauges, read through a serial port or the network.")
         last = make_column(self._last_name, self._last, spacing=6)
-        parts = (last, self._form, self._verified, self._error, STRETCH, self._find, self._connect)
+        parts = (last, self._find, self._form, self._verified, self._error, self._connect, STRETCH)
         return _card(gettext("My amplifier"), hint, *parts)
 
     def _recording_card(self) -> QFrame:
         hint = gettext("Look at a run again: record against simulation, and what was found.")
-        return _card(gettext("Recordings"), hint, self._folder, self._runs, STRETCH, self._open)
+        return _card(gettext("Recordings"), hint, self._folder, self._open, self._runs, STRETCH)
 
 
 class _RecentRuns(QWidget):
@@ -208,7 +208,8 @@ class _Form(QWidget):
         show_texts(self._fields, form)
         self._parity.setCurrentIndex(list(_PARITIES).index(form.parity))
         self._stop_bits.setCurrentText(form.stop_bits)
-        if form.settings or form.relative_port or (form.parity, form.stop_bits) != ("N", "1"):
+        has_rare = form.settings or form.relative_port or (form.parity, form.stop_bits) != ("N", "1")
+        if has_rare and form != state.last_form:  # those of the last device need not be looked at
             self._more.setChecked(True)
         usual = state.selected_protocol.default_baud if state.selected_protocol else None
         self._fields["baud"].setPlaceholderText(f"{usual}" if usual else gettext("the protocol's usual one"))

@@ -180,6 +180,7 @@ class MainWindow(KeyboardWindow):
         if screen not in self._screens:
             self._screens[screen] = made = self._build_screen(screen)
             made.setAccessibleName(gettext(screen.label))
+            made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # without one Qt looks for another at the start
             self._stack.addWidget(made)
             self._geometry.restore_parts(made)
         return self._screens[screen]
@@ -209,6 +210,8 @@ class MainWindow(KeyboardWindow):
 
     def _menu_button(self) -> QToolButton:
         button = _make_rail_button(gettext("Menu"))
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)  # low, for low screens
+        button.setAccessibleName(button.text())
         fill_menu(button, self, self.show_help)
         bind_button(button, "F10", gettext("About, documentation, log"), self)
         return button
@@ -240,7 +243,7 @@ class MainWindow(KeyboardWindow):
         rail.setProperty("role", "rail")
         at_top = [button for screen, button in self._rail.items() if screen not in _AT_FOOT]
         at_foot = [self._rail[screen] for screen in _AT_FOOT]
-        make_column(*at_top, STRETCH, *at_foot, self._menu, spacing=4, margins=(8, 8), of=rail)
+        make_column(*at_top, STRETCH, *at_foot, self._menu, spacing=2, margins=(8, 8), of=rail)
         content = make_column(self._notice, (self._stack, 1))
         make_row(rail, (content, 1), of=middle)
         self.setCentralWidget(middle)

@@ -49,6 +49,11 @@ class PortsPanel(QWidget):
             self._shown = state.ports
             self._list.setWidget(self._rows(state.ports))
 
+    def focus_found(self) -> None:
+        """Focus the first device that was found; the button Look without one."""
+        found = self._list.findChildren(QPushButton)
+        (found[0] if found else self._look).setFocus()
+
     def add_keys(self, screen: QWidget) -> None:
         bind_button(self._look, "F5", gettext("Listen on every free port, and say what speaks there"), screen)
 

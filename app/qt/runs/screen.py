@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
-from PySide6.QtWidgets import QFileDialog, QLineEdit, QPushButton, QStackedWidget, QWidget
+from PySide6.QtWidgets import QFileDialog, QLineEdit, QStackedWidget, QWidget
 
 from app.presenters.runs.presenter import RUN_SUFFIX, RunsPresenter
 from app.presenters.runs.state import RunFilter, RunsState, StatusFilter
@@ -44,8 +44,7 @@ class RunsScreen(QWidget):
         self._import = make_button(gettext("Import…"), self._choose_files)
         title = gettext("Show the runs of a folder")
         self._folder = FolderButton(title, lambda: presenter.recent_folders, presenter.choose_folder)
-        self._trash = QPushButton(gettext("Show trash"))
-        self._trash.setCheckable(True)
+        self._trash = make_button("", self._toggle_trash)
         self._table = RunsTable(theme)
         self._empty = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
@@ -70,7 +69,7 @@ class RunsScreen(QWidget):
         if old is None or state.rows is not old.rows or state.selected != old.selected:
             self._table.show_rows(state.rows, state.selected)
         self._table.show_order(state.sorted_by, descending=state.descending)
-        self._trash.setChecked(state.in_trash)
+        self._trash.setText(gettext("Show runs") if state.in_trash else gettext("Show trash"))
         self._import.setEnabled(not state.in_trash)
         self._show_middle(state)
         if old is None or state.overlay is not old.overlay:
@@ -125,6 +124,9 @@ class RunsScreen(QWidget):
         dialog.filesSelected.connect(self._take_files)
         dialog.open()
 
+    def _toggle_trash(self) -> None:
+        self._presenter.show_trash(not self._presenter.state.in_trash)
+
     def _ask_to_empty(self) -> None:
         count = self._presenter.state.total
         text = ngettext("Delete {count} run for ever?", "Delete {count} runs for ever?", count)
@@ -137,6 +139,8 @@ class RunsScreen(QWidget):
 
     def _show_middle(self, state: RunsState) -> None:
         count = ngettext("{count} run", "{count} runs", state.total)
+        if state.in_trash:
+            count = gettext("Trash: {runs}", runs=count)
         if state.filter != RunFilter():
             count = gettext("{shown} of {total}", shown=len(state.rows), total=count)
         self._count.setText(count if state.is_listed else "")
@@ -157,7 +161,6 @@ class RunsScreen(QWidget):
     def _connect(self) -> None:
         for changed in (self._text.textChanged, self._series.activated, self._status.activated):
             changed.connect(lambda _: self._apply_filter())
-        self._trash.clicked.connect(self._presenter.show_trash)
         bind_button(self._trash, "Ctrl+T", gettext("Runs in the trash, or those of the folder again"), self)
         bind_button(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
         self._table.selected.connect(self._presenter.select)

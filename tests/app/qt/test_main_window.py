@@ -222,7 +222,7 @@ def test_tab_goes_through_the_start_page_in_reading_order(desk: Desk) -> None:
         focused = QApplication.focusWidget()
         names.append(focused.accessibleName() or focused.text())
     assert names == [
-        "Port", "Protocol", "Baud", "Rate, Hz", "More settings", "Find my amplifier", "Connect my amplifier",
+        "Find my amplifier", "Port", "Protocol", "Baud", "Rate, Hz", "More settings", "Connect my amplifier",
         "Open a recording",
     ]  # fmt: skip
 

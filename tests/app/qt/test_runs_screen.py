@@ -205,6 +205,15 @@ def test_runs_are_analysed_by_key_and_anew_with_shift_and_shown_beside_other_wor
     assert f"Analysing {Path(path).stem}, 1 of 1. Moved {Path(path).stem} to the trash" in said
 
 
+@pytest.mark.parametrize("key", [Qt.Key.Key_Up, Qt.Key.Key_Down])
+def test_an_arrow_selects_the_only_run(stage: Stage, key: Qt.Key) -> None:
+    stage.presenter.refresh()
+    stage.answer("list_folder", RUNS[:1])
+    stage.table.setFocus()
+    stage.qtbot.keyClick(stage.table, key)
+    assert stage.presenter.state.selected == (RUNS[0].path,)
+
+
 def test_a_note_is_kept_on_enter_and_undone_with_a_key(stage: Stage) -> None:
     stage.list_runs()
     stage.click_row(0)

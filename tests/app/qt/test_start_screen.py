@@ -83,7 +83,7 @@ def test_an_amplifier_that_is_found_is_connected_by_enter(desk: Desk) -> None:
     assert held in visible_words(dialog)
     assert clipped_words(dialog) == []
     (connect,) = [button for button in dialog.findChildren(QPushButton) if button.text() == "Connect"]
-    connect.setFocus()
+    assert dialog.focusWidget() is connect
     desk.qtbot.keyClick(connect, Qt.Key.Key_Return)
     assert not dialog.isVisible()
     assert desk.presenter.state.screen is Screen.RECORD
