@@ -327,6 +327,7 @@ class Settings(_Checked, frozen=True):
     sounds: bool = False  # whether each state of a pullback has a sound
     connect_at_start: bool = False  # whether the window connects to the last amplifier by itself
     log_level: Literal["error", "warning", "info", "debug"] = "info"  # of all logs
+    displacement_unit: Literal["mm", "um"] = "mm"  # of displacements on screens
 
     def __post_init__(self) -> None:
         if not SCALE_MIN <= self.scale <= SCALE_MAX:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from analysis.catalogue import DISPLACEMENT_UNITS
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
 from config.schema import ConfigError, Settings
@@ -15,6 +16,7 @@ CHOICES: dict[str, dict[Any, str]] = {
     "theme": {"system": N_("As the system"), "light": N_("Light"), "dark": N_("Dark")},
     "language": {"system": N_("As the system"), "en": "English", "ru": "Русский"},
     "scale": {scale: f"{scale:.0%}" for scale in (1.0, 1.25, 1.5, 1.75, 2.0)},
+    "displacement_unit": {name: unit.symbol for name, unit in DISPLACEMENT_UNITS.items()},
     "log_level": {
         "error": N_("Errors only"),
         "warning": N_("Errors and warnings"),
@@ -23,7 +25,13 @@ CHOICES: dict[str, dict[Any, str]] = {
     },
 }
 """Values of settings and their titles."""
-_AT_START = ("language", "scale", "recordings", "log_level")  # settings that take effect after a restart
+_AT_START = (
+    "language",
+    "scale",
+    "displacement_unit",
+    "recordings",
+    "log_level",
+)  # settings that take effect after a restart
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,7 @@ class SettingsScreen(QWidget):
         self._connects.setChecked(settings.connect_at_start)
         self._undo.setEnabled(state.can_undo)
         show_chip(self._message, state.message)
-        waits = gettext("Language, size, folder and log change at the next start")
+        waits = gettext("Language, size, unit, folder and log change at the next start")
         show_chip(self._waits, Chip(waits if state.needs_restart else "", Tone.WARN))
 
     def _choice(self, name: str) -> ComboBox:
@@ -108,6 +108,7 @@ class SettingsScreen(QWidget):
             (gettext("Theme"), self._choices["theme"]),
             (gettext("Language"), self._choices["language"]),
             (gettext("Size"), self._choices["scale"]),
+            (gettext("Displacements in"), self._choices["displacement_unit"]),
         )
         return _card(gettext("Look"), "", make_form_grid(fields, wide=False))
 
