@@ -151,7 +151,7 @@ def _pull(situation: PullbackSituation) -> tuple[Message, Message]:
 
 
 def _early_release(situation: PullbackSituation) -> tuple[Message, Message]:
-    early = message("Let go too early, at {length}", length=_mm(situation.position.early_release_m or 0.0))
+    early = message("Let go too early, at {length}", length=_length(situation.position.early_release_m or 0.0))
     if situation.simulated:
         return early, message("The stand puts the plate back and pulls again by itself.")
     return early, message("Put the plate back and pull again.")
