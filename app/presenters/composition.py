@@ -32,13 +32,8 @@ def read_personal() -> PersonalSettings:
     except ConfigError as error:
         fault = str(error)
     recordings = recordings_directory(settings)
-    shown = (
-        SettingsFile(N_("These settings"), str(files.settings_path())),
-        SettingsFile(N_("Stand and masses"), str(files.settings_file("stand.toml"))),
-        SettingsFile(N_("Gauges"), str(files.settings_file("gauges.toml"))),
-    )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
-    return PersonalSettings(settings, fault, str(recordings), overridden, shown, _save)
+    return PersonalSettings(settings, fault, str(recordings), overridden, _list_files, _save)
 
 
 def make_window_presenter(
@@ -70,6 +65,14 @@ def make_window_presenter(
             files.save_stand,
         ),
         errors,
+    )
+
+
+def _list_files() -> tuple[SettingsFile, ...]:
+    return (
+        SettingsFile(N_("These settings"), str(files.settings_path())),
+        SettingsFile(N_("Stand and masses"), str(files.settings_file("stand.toml"))),
+        SettingsFile(N_("Gauges"), str(files.settings_file("gauges.toml"))),
     )
 
 

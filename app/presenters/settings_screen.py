@@ -8,7 +8,7 @@ from typing import Any
 from analysis.catalogue import DISPLACEMENT_UNITS
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
-from config.schema import ConfigError, Settings
+from config.schema import ConfigError, Settings, Stand
 from messages.i18n import N_, gettext
 from messages.message import message_of
 
@@ -35,18 +35,19 @@ _AT_START = (
 
 
 @dataclass(frozen=True, slots=True)
+class SettingsFile:
+    name: str
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
 class SettingsState:
     settings: Settings = field(default_factory=Settings)
     needs_restart: bool = False
     can_undo: bool = False
     message: Chip = EMPTY_CHIP
     """Fault of the last change."""
-
-
-@dataclass(frozen=True, slots=True)
-class SettingsFile:
-    name: str
-    path: str
+    files: tuple[SettingsFile, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,8 @@ class PersonalSettings:
     recordings: str = ""
     override: str = ""
     """Environment variable that overrides the folder; empty if none does."""
-    files: tuple[SettingsFile, ...] = ()
+    list_files: Callable[[], tuple[SettingsFile, ...]] = tuple
+    """Lists the files of settings that are in use: the laboratory's own, else the shipped ones."""
     save: Callable[[Settings], Path | None] = lambda _: None
     """Saves settings; returns the backup of an unreadable file, if there was one. Raises ConfigError."""
 
@@ -68,10 +70,14 @@ class SettingsPresenter(Presenter[SettingsState]):
     """Changes personal settings; `apply` applies new ones to the window."""
 
     def __init__(self, personal: PersonalSettings, apply: Callable[[Settings], None]) -> None:
-        super().__init__(SettingsState(personal.settings))
+        super().__init__(SettingsState(personal.settings, files=personal.list_files()))
         self.personal = personal
         self._apply = apply
         self._before: list[Settings] = []
+
+    def on_stand(self, _stand: Stand) -> None:
+        """Show another file, where the laboratory had none of its own before."""
+        self._update(files=self.personal.list_files())
 
     def change(self, **changes: Any) -> None:
         """Set fields of `Settings`, and save them; an invalid value changes nothing."""

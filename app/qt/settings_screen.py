@@ -19,6 +19,7 @@ from app.qt.widgets.inputs import CheckBox, ComboBox, ask_for_folder, make_butto
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
+    clear,
     make_card,
     make_column,
     make_form_grid,
@@ -46,6 +47,8 @@ class SettingsScreen(QWidget):
         self._connects = CheckBox(gettext("Connect to the last amplifier at the start"))
         self._stand = make_button(gettext("Edit the stand…"), edit_stand)
         self._undo = make_button(gettext("Undo"), presenter.undo)
+        self._files = QGridLayout()
+        self._shown_files: tuple[SettingsFile, ...] = ()
         self._message = label(wrap=True)
         self._waits = label(wrap=True)
         self._lay_out()
@@ -61,6 +64,9 @@ class SettingsScreen(QWidget):
 
     def show_state(self, state: SettingsState) -> None:
         settings = state.settings
+        if state.files != self._shown_files:
+            self._shown_files = state.files
+            self._show_files(state.files)
         for name, choice in self._choices.items():
             choice.setCurrentIndex(choice.findData(getattr(settings, name)))
         show_texts({"operator": self._operator, "recordings": self._recordings}, settings)
@@ -125,16 +131,18 @@ class SettingsScreen(QWidget):
 
     def _files_card(self) -> QFrame:
         hint = gettext("Stand and gauges are read when the window starts or a device is connected.")
-        files = QGridLayout()
-        files.setHorizontalSpacing(12)
-        files.setVerticalSpacing(8)
-        files.setColumnStretch(1, 1)
-        for row, file in enumerate(self._presenter.personal.files):
-            files.addWidget(label(gettext(file.name)), row, 0)
-            files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
-            files.addWidget(_open_button(file), row, 2)
-        log = make_form_grid(((gettext("Log"), self._choices["log_level"]),), wide=False)
-        return _card(gettext("Files"), hint, files, make_row(self._stand, STRETCH), log)
+        self._files.setHorizontalSpacing(12)
+        self._files.setVerticalSpacing(8)
+        self._files.setColumnStretch(1, 1)
+        more = ((gettext("Stand"), self._stand), (gettext("Log"), self._choices["log_level"]))
+        return _card(gettext("Files"), hint, self._files, make_form_grid(more, wide=False))
+
+    def _show_files(self, files: tuple[SettingsFile, ...]) -> None:
+        clear(self._files)
+        for row, file in enumerate(files):
+            self._files.addWidget(label(gettext(file.name)), row, 0)
+            self._files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
+            self._files.addWidget(_open_button(file), row, 2)
 
 
 def _card(title: str, hint: str, *parts: Item) -> QFrame:

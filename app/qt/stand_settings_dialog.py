@@ -1,6 +1,6 @@
 """Dialog of the settings of the stand. It does not block the window."""
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QDialog,
@@ -26,7 +26,7 @@ from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import N_, gettext
 
-_SIZE = 880, 560
+_SIZE = 880, 720
 _TABLES = {
     "pullbacks": (N_("Pullbacks"), N_("Pullback, mm")),
     "contacts": (N_("Contacts"), N_("Surfaces that slide on each other")),
@@ -71,6 +71,7 @@ class StandSettingsDialog(QDialog):
         ):
             if field.text() != text:
                 field.setText(text)
+                field.setCursorPosition(0)  # the beginning of a long name in sight
         for name, table in self._tables.items():
             table.show_rows(getattr(form, name))
         show_chip(self._message, state.message)
@@ -107,7 +108,7 @@ class StandSettingsDialog(QDialog):
             of=self,
         )
         self.setWindowTitle(gettext("Stand"))
-        self.resize(*_SIZE)
+        self.resize(QSize(*_SIZE).boundedTo(self.screen().availableSize()))
 
 
 class _Rows(QWidget):
@@ -120,10 +121,12 @@ class _Rows(QWidget):
         self._table = QTableWidget(0, 2)
         self._table.setHorizontalHeaderLabels([gettext("Code"), value_title])
         self._table.setAccessibleName(title)
+        titles = self._table.horizontalHeader()
+        titles.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         self._table.verticalHeader().hide()
         self._table.setTabKeyNavigation(False)
         self._table.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        self._table.horizontalHeader().setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        titles.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
         self._table.itemChanged.connect(lambda _: self.edited.emit())
         add = make_button("+", self._add)
         remove = make_button("\u2212", self._remove)

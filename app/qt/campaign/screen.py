@@ -10,12 +10,12 @@ from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignState, CampaignSummary, Product
 from app.qt.campaign.friction_plot import FrictionPlot
-from app.qt.campaign.sections import SelectedRuns, clear, make_sections
+from app.qt.campaign.sections import SelectedRuns, make_sections
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.folder_button import FolderButton, OpenFolderButton
 from app.qt.widgets.inputs import ProgressBar, ask_for_folder, make_button
-from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
+from app.qt.widgets.layouts import STRETCH, clear, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import N_, gettext, ngettext

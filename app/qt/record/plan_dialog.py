@@ -137,6 +137,7 @@ def _make_table() -> QTableWidget:
     table = QTableWidget(0, len(_TITLES))
     table.setHorizontalHeaderLabels([gettext(title) for title in _TITLES])
     table.horizontalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Stretch)
+    table.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
     table.verticalHeader().hide()
     table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
     table.setTabKeyNavigation(False)
