@@ -132,6 +132,8 @@ class QuantityDefinition:
         """
         if unit and unit != self.unit:
             return Unit(unit)
+        if place is Place.WINDOW and self.display is MILLIMETRE:
+            return displacement_unit()
         return self.display_at.get(place, self.display)
 
     def format(self, quantity: Quantity, place: Place) -> FormattedValue:
@@ -164,6 +166,30 @@ METRES_PER_SECOND = Unit("m/s")
 KILOGRAM = Unit("kg")
 ACCELERATION = Unit("m/s²", latex="m/s$^2$")
 _IN_METRES = {Place.TABLE: METRES_PER_SECOND, Place.REPORT: METRES_PER_SECOND}
+
+DISPLACEMENT_UNITS: Final = {"mm": MILLIMETRE, "um": MICROMETRE}
+"""Units that the window may show displacements in, by their names in the settings."""
+_displacement_unit = MILLIMETRE
+
+
+def use_displacement_unit(unit: Unit) -> None:
+    """Show displacements in a unit on screens from now on; files, reports and terminals keep mm.
+
+    Only the window calls it, in each process in which it formats numbers.
+    """
+    global _displacement_unit  # noqa: PLW0603 - as the language: one unit a process
+    _displacement_unit = unit
+
+
+def displacement_unit() -> Unit:
+    """Unit of displacements on screens."""
+    return _displacement_unit
+
+
+def displacement_decimals(decimals: int) -> int:
+    """Decimals on screens of a displacement that has so many `decimals` in millimetres."""
+    return max(decimals - round(math.log10(_displacement_unit.scale / MILLIMETRE.scale)), 0)
+
 
 _Row = QuantityDefinition
 CATALOGUE: Final = (
@@ -300,6 +326,11 @@ CATALOGUE: Final = (
 def reading_units(unit: str) -> tuple[Unit, Unit]:
     """Units in which readings in `unit` and their residuals are drawn: metres as mm and µm."""
     return (MILLIMETRE, MICROMETRE) if unit == "m" else (Unit(unit), Unit(unit))
+
+
+def reading_units_on_screen(unit: str) -> tuple[Unit, Unit]:
+    """Units in which the window draws readings in `unit` and their residuals."""
+    return (displacement_unit(), MICROMETRE) if unit == "m" else reading_units(unit)
 
 
 def definition(name: str) -> QuantityDefinition:

@@ -27,6 +27,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from analysis.motion.two_mass import TwoMassParameters
 from app.presenters.analysis_task import analyse_run
 from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.report import ReportPresenter
 from app.presenters.worker import Worker
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
@@ -68,7 +69,7 @@ class Stage:
     def __init__(self, app: QApplication, path: Path) -> None:
         self._app = app
         self._worker = Worker()
-        self.presenter = IdentifyPresenter(self._worker)
+        self.presenter = IdentifyPresenter(self._worker, ReportPresenter(Worker()))
         self.screen = IdentifyScreen(Theme(app), self.presenter, lambda: None)
         self.screen.resize(1208, 800)
         self.presenter.attach(self.screen)

@@ -6,7 +6,7 @@ import datetime
 import itertools
 import os
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
@@ -48,7 +48,40 @@ def settings_file(name: str) -> Path:
 
 def load_stand(path: Path | str | None = None) -> Stand:
     """Read a stand file, by default the one in use. Raises ConfigError."""
-    return _load(Path(path) if path else settings_file("stand.toml"), Stand)
+    path = Path(path) if path else settings_file("stand.toml")
+    stand = _load(path, Stand)
+    try:
+        stand.check_codes()
+    except ConfigError as error:
+        raise ConfigError("{path}: {fault}", path=path, fault=error.message) from None
+    return stand
+
+
+def parse_stand(values: dict[str, Any]) -> Stand:
+    """Make a stand of values as a stand file holds them, checked alike. Raises ConfigError."""
+    try:
+        stand = msgspec.convert(values, Stand)
+    except msgspec.ValidationError as error:
+        raise ConfigError("{fault}", fault=_explain(str(error), values)) from None
+    stand.check_codes()
+    return stand
+
+
+def save_stand(stand: Stand) -> Path:
+    """Write the stand file of the laboratory, whose path is returned; its comments stay. Raises ConfigError.
+
+    Without one of its own the shipped file is taken over.
+    """
+    import tomlkit  # only needed to write
+
+    source, target = settings_file("stand.toml"), config_directory() / "stand.toml"
+    with _writing(target):
+        load_stand(source)  # a file that cannot be read is not written over
+        document = tomlkit.parse(source.read_text(encoding="utf-8"))
+        _merge(document, _stated(stand, document))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        _replace(target, tomlkit.dumps(document))
+    return target
 
 
 def load_gauges(path: Path | str | None = None) -> Gauges:
@@ -86,6 +119,32 @@ def save_calibration(
             template = N_("{path} exists already and is not overwritten. Choose another name")
             raise ConfigError(template, path=path) from None
     return path
+
+
+def _stated(stand: Stand, before: Collection[str]) -> dict[str, Any]:
+    """Values for a stand file; a default or an empty table that did not stand there before needs no line."""
+    values = msgspec.to_builtins(stand)
+    defaults = {field.name: field.default for field in msgspec.structs.fields(Stand)}
+    return {
+        name: value for name, value in values.items() if name in before or value not in (defaults[name], {})
+    }
+
+
+def _merge(table: Any, values: dict[str, Any]) -> None:
+    """Write values into a table of a TOML document; keys without a value go, and comments stay."""
+    import tomlkit  # only needed to write
+
+    for key in [key for key in table if key not in values]:
+        del table[key]
+    for key, value in values.items():
+        if isinstance(value, dict) and key in table:
+            _merge(table[key], value)
+        elif isinstance(value, dict):
+            made = tomlkit.inline_table()
+            made.update(value)
+            table[key] = made
+        elif table.get(key) != value:
+            table[key] = value
 
 
 def _toml_value(value: Any) -> Any:
@@ -169,6 +228,17 @@ def save_window_layout(place: schema.WindowLayout, day: datetime.date) -> Path |
     for key in ("widths", "sorted_by"):
         values[key] = {name: list(row) for name, row in values[key].items()}
     return _save(config_directory() / "window.toml", values, schema.WindowLayout, day)
+
+
+def load_recent() -> schema.RecentUse:
+    """Read what was used last; nothing where nothing was. Raises ConfigError."""
+    return _load_or_default(config_directory() / "recent.toml", schema.RecentUse)
+
+
+def save_recent(recent: schema.RecentUse, day: datetime.date) -> Path | None:
+    """Keep what was used last, as `save_settings` keeps settings. Raises ConfigError."""
+    values = {name: value for name, value in msgspec.to_builtins(recent).items() if value is not None}
+    return _save(config_directory() / "recent.toml", values, schema.RecentUse, day)
 
 
 def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date) -> Path | None:

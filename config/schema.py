@@ -36,6 +36,14 @@ class SeriesError(ConfigError, ValueError):
     """A series code that is not one of this stand."""
 
 
+_CODES = {
+    "pullbacks_m": (r"\d", N_("a digit, such as 1")),
+    "contacts": (r"[A-Z]+", N_("capital letters, such as FF")),
+    "added_masses_kg": (r"M\d+", N_("M and a number, such as M0")),
+}
+"""Form of the three parts of a series code, and that form in words."""
+
+
 class _Checked(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Base of all settings: immutable, unknown keys refused, `replace` checks again."""
 
@@ -86,6 +94,20 @@ class Stand(_Checked, frozen=True):
         self._check(_POSITIVE, "table_mass_kg", "plate_mass_kg", "gravity_m_per_s2", "pullbacks_m")
         self._check(_NOT_NEGATIVE, "table_mass_standard_uncertainty_kg", "plate_mass_standard_uncertainty_kg")
         self._check(_NOT_NEGATIVE, "gravity_standard_uncertainty_m_per_s2", "added_masses_kg")
+
+    def check_codes(self) -> None:
+        """Check that its alphabets make series codes. Raises ConfigError.
+
+        A run that holds such a stand can still be read.
+        """
+        for name, (form, words) in _CODES.items():
+            codes = list(getattr(self, name))
+            if not codes:
+                raise ConfigError("{name} is empty: a series needs one", name=name)
+            for code in codes:
+                if re.fullmatch(form, code) is None:
+                    template = N_("{name}: code {code!r} makes no series code: write {words}")
+                    raise ConfigError(template, name=name, code=code, words=message(words))
 
     @property
     def all_series(self) -> tuple[str, ...]:
@@ -304,7 +326,9 @@ class Settings(_Checked, frozen=True):
     operator: str = ""  # who records, unless a run names another operator
     sounds: bool = False  # whether each state of a pullback has a sound
     count_simulated: bool = False  # whether simulated runs count beside others, in plan and campaign
+    connect_at_start: bool = False  # whether the window connects to the last amplifier by itself
     log_level: Literal["error", "warning", "info", "debug"] = "info"  # of all logs
+    displacement_unit: Literal["mm", "um"] = "mm"  # of displacements on screens
 
     def __post_init__(self) -> None:
         if not SCALE_MIN <= self.scale <= SCALE_MAX:
@@ -334,6 +358,33 @@ class WindowLayout(_Checked, frozen=True):
                 raise ValueError(
                     f"{name} = {value} is beyond any screen: must be within ±{_MAX_PIXELS} pixels"
                 )
+
+
+class RecentDevice(_Checked, frozen=True):
+    """The amplifier that was connected last, as its port is typed on Start."""
+
+    name: str  # by which the device calls itself
+    port: str
+    protocol: str
+    baud: str = ""
+    rate_hz: str = ""
+    parity: Literal["N", "E", "O"] = "N"
+    stop_bits: Literal["1", "2"] = "1"
+    settings: str = ""
+    relative_port: str = ""
+    usb: str = ""
+    """USB numbers of the port, by which it is found under another name; empty for others."""
+
+
+class RecentUse(_Checked, frozen=True):
+    """What was used last; runs and folders newest first."""
+
+    device: RecentDevice | None = None
+    runs: tuple[str, ...] = ()
+    folders: tuple[str, ...] = ()
+    """Folders of runs."""
+    export_folder: str = ""
+    import_folder: str = ""
 
 
 class PublishedRow(_Checked, frozen=True):

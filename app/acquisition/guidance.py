@@ -6,6 +6,8 @@ The command line prints both; the window translates them.
 import math
 from dataclasses import dataclass
 
+from analysis.catalogue import displacement_decimals, displacement_unit
+from analysis.formatting import typeset, with_unit
 from app.acquisition.messages import PullbackState, StandPosition
 from app.acquisition.pullback.plan import AllowedPlateRange
 from messages.i18n import N_
@@ -39,7 +41,6 @@ _NEEDS_DEVICE = frozenset(PullbackState) - {PullbackState.CLOSING}
 _MOVED_BY_HAND = (PullbackState.RECENTRE, PullbackState.PULLING)
 """The operator needs the readings here even if there is a note."""
 _UNKNOWN_POSITION = StandPosition()
-_THIN_SPACE, _MINUS = "\u202f", "\u2212"
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,17 +141,19 @@ def _pull(situation: PullbackSituation) -> tuple[Message, Message]:
         if situation.simulated:
             return message("The stand pulls back"), _now(situation)
         return message("Pull the table back"), _now(situation)
-    target, overshoot_m = _mm(position.pullback_m), situation.pulled_m - position.pullback_m
+    target, overshoot_m = _length(position.pullback_m), situation.pulled_m - position.pullback_m
     if situation.simulated:
         return message("The stand pulls back to {target}", target=target), _now(situation)
     if overshoot_m > position.tolerance_m:
-        detail = message("{now}, {length} too far", now=_now(situation), length=_mm(overshoot_m))
+        detail = message("{now}, {length} too far", now=_now(situation), length=_length(overshoot_m))
         return message("Ease the table back to {target}", target=target), detail
     return message("Pull the table back to {target}", target=target), _now(situation)
 
 
 def _early_release(situation: PullbackSituation) -> tuple[Message, Message]:
-    early = message("Let go too early, at {length}", length=_mm(situation.position.early_release_m or 0.0))
+    early = message(
+        "Let go too early, at {length}", length=_length(situation.position.early_release_m or 0.0)
+    )
     if situation.simulated:
         return early, message("The stand puts the plate back and pulls again by itself.")
     return early, message("Put the plate back and pull again.")
@@ -161,7 +164,7 @@ def _push_back(situation: PullbackSituation) -> tuple[Message, Message]:
     if wanted_m is None:
         wanted_m = situation.plate_range.best_m if situation.plate_range else 0.0
     missing_m = wanted_m - situation.plate_m
-    side, wanted, now = situation.position.side, _mm(wanted_m), _mm(situation.plate_m)
+    side, wanted, now = situation.position.side, _length(wanted_m), _length(situation.plate_m)
     if side == 0:
         template = N_("Until gauge 2 reads {wanted}; now {now}.")
     elif missing_m * side > 0.0:
@@ -173,14 +176,13 @@ def _push_back(situation: PullbackSituation) -> tuple[Message, Message]:
             "Away from the side to which the table is pulled, until gauge 2 reads {wanted}; now {now}."
         )
     detail = message(template, wanted=wanted, now=now)
-    return message("Push the plate back by {length}", length=_mm(abs(missing_m))), detail
+    return message("Push the plate back by {length}", length=_length(abs(missing_m))), detail
 
 
 def _now(situation: PullbackSituation) -> Message:
-    return message("now {length}", length=_mm(situation.pulled_m))
+    return message("now {length}", length=_length(situation.pulled_m))
 
 
-def _mm(value_m: float) -> str:
-    if not math.isfinite(value_m):
-        return f"–{_THIN_SPACE}mm"
-    return f"{round(1e3 * value_m, 1) + 0.0:.1f}{_THIN_SPACE}mm".replace("-", _MINUS)
+def _length(value_m: float) -> str:
+    unit = displacement_unit()
+    return with_unit(typeset(unit.number(value_m, displacement_decimals(1))), unit.symbol)

@@ -6,7 +6,7 @@ from enum import Enum, StrEnum
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
-from config.schema import Gauges
+from config.schema import Gauges, Stand
 from messages.i18n import N_, gettext, ngettext
 from messages.message import Message
 
@@ -22,15 +22,15 @@ class View(Protocol[Shown]):
 
 
 class Presenter(Generic[State]):
-    """Base of all presenters. A view may be attached at any time."""
+    """Base of all presenters. Views may be attached at any time."""
 
     def __init__(self, state: State) -> None:
         self.state = state
-        self._view: View[State] | None = None
+        self._views: list[View[State]] = []
 
     def attach(self, view: View[State]) -> None:
         """Show the state on `view`, now and whenever it changes."""
-        self._view = view
+        self._views.append(view)
         view.show_state(self.state)
 
     def enter(self) -> None:
@@ -45,14 +45,17 @@ class Presenter(Generic[State]):
     def on_gauges(self, gauges: Gauges) -> None:
         """React to other calibrations being in use."""
 
+    def on_stand(self, stand: Stand) -> None:
+        """React to another stand being in use."""
+
     def close(self) -> None:
         """End the workers."""
 
     def _set_state(self, state: State) -> None:
         if state != self.state:
             self.state = state
-            if self._view is not None:
-                self._view.show_state(state)
+            for view in self._views:
+                view.show_state(state)
 
     def _update(self, **changes: Any) -> None:
         if any(getattr(self.state, name) != value for name, value in changes.items()):

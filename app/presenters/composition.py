@@ -8,9 +8,10 @@ from pathlib import Path
 from app.acquisition.engine_client import EngineClient
 from app.acquisition.messages import PortSettings
 from app.presenters.connection import Connection
-from app.presenters.error_reports import ErrorReporter
+from app.presenters.error_reports import ErrorReporter, error_report
 from app.presenters.navigator import ConnectForm, StandContext
 from app.presenters.notices import NoticeSources
+from app.presenters.recent import RecentItems
 from app.presenters.settings_screen import PersonalSettings, SettingsFile
 from app.presenters.start_screen import PortChoice, StartState
 from app.presenters.window import WindowContext, WindowPresenter
@@ -21,7 +22,7 @@ from app.runs.unattended import read_notes
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config import files
-from config.schema import ConfigError, Settings
+from config.schema import ConfigError, RecentUse, Settings
 from drivers.registry import DRIVERS
 from messages.i18n import N_
 
@@ -34,13 +35,8 @@ def read_personal() -> PersonalSettings:
     except ConfigError as error:
         fault = str(error)
     recordings = recordings_directory(settings)
-    shown = (
-        SettingsFile(N_("These settings"), str(files.settings_path())),
-        SettingsFile(N_("Stand and masses"), str(files.settings_file("stand.toml"))),
-        SettingsFile(N_("Gauges"), str(files.settings_file("gauges.toml"))),
-    )
     overridden = RECORDINGS if os.environ.get(RECORDINGS) else ""
-    return PersonalSettings(settings, fault, str(recordings), overridden, shown, _save)
+    return PersonalSettings(settings, fault, str(recordings), overridden, _list_files, _save)
 
 
 def make_window_presenter(
@@ -68,6 +64,8 @@ def make_window_presenter(
             simulation,
             _list_ports,
             _notice_sources(context.directory),
+            _read_recent(errors),
+            files.save_stand,
         ),
         errors,
     )
@@ -80,14 +78,41 @@ def _notice_sources(directory: Path) -> NoticeSources:
     return NoticeSources(count_unfinished, partial(read_notes, directory))
 
 
+def _list_files() -> tuple[SettingsFile, ...]:
+    return (
+        SettingsFile(N_("These settings"), str(files.settings_path())),
+        SettingsFile(N_("Stand and masses"), str(files.settings_file("stand.toml"))),
+        SettingsFile(N_("Gauges"), str(files.settings_file("gauges.toml"))),
+    )
+
+
 def _save(settings: Settings) -> Path | None:
-    return files.save_settings(settings, datetime.datetime.now().astimezone().date())
+    return files.save_settings(settings, _today())
 
 
 def _list_ports() -> tuple[PortChoice, ...]:
     from drivers.port import list_ports
 
-    return tuple(PortChoice(port.device, port.description) for port in list_ports())
+    return tuple(
+        PortChoice(port.device, port.description, port.identity.removeprefix(port.device).strip())
+        for port in list_ports()
+    )
+
+
+def _read_recent(errors: ErrorReporter) -> RecentItems:
+    def report(error: ConfigError) -> None:
+        errors.report(error_report(error))
+
+    try:
+        recent = files.load_recent()
+    except ConfigError as error:
+        report(error)
+        recent = RecentUse()
+    return RecentItems(recent, lambda changed: files.save_recent(changed, _today()), report)
+
+
+def _today() -> datetime.date:
+    return datetime.datetime.now().astimezone().date()
 
 
 def _start_state(context: StandContext, simulation: SimulatedStandOptions) -> StartState:

@@ -31,7 +31,7 @@ class DeviceMonitor:
 
     def __init__(
         self,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
         now: Callable[[], datetime.datetime] = datetime.datetime.now,
     ) -> None:
         self._clock = clock

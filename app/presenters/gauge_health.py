@@ -5,11 +5,11 @@ from typing import Final
 
 import numpy as np
 
-from analysis.catalogue import MICROMETRE, MILLIMETRE
+from analysis.catalogue import MICROMETRE
 from analysis.formatting import MINUS, with_unit
 from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, diagnose, worst_grade
 from app.presenters.base import LabelledValue
-from app.presenters.number_text import format_fixed, format_in
+from app.presenters.number_text import format_displacement, format_fixed
 from messages.i18n import gettext, translate
 
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
@@ -53,7 +53,7 @@ def _figures(health: GaugeHealth) -> tuple[LabelledValue, ...]:
     uncertainty = format_fixed(health.drift_standard_uncertainty_m_per_min * 1e6, 1)
     hums = {gettext("hum, {frequency:g} Hz", frequency=hum.frequency_hz): _hum(hum) for hum in health.hum}
     figures = {
-        gettext("reading"): format_in(MILLIMETRE, health.mean_m, 3),
+        gettext("reading"): format_displacement(health.mean_m, 3),
         gettext("noise, rms"): _micrometres(health.noise_rms_m),
         gettext("drift"): with_unit(f"{drift} ± {uncertainty}", "µm/min"),
         **hums,

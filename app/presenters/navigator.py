@@ -58,6 +58,9 @@ class Navigator(Protocol):
         """Show the runs of a folder on Runs; only those of `series` unless it is empty."""
 
     def open_run(self, path: str) -> None: ...
+    def connect_device(self, form: ConnectForm) -> None:
+        """Fill in Start, and connect."""
+
     def fill_connection(self, form: ConnectForm) -> None: ...
     def fill_second_port(self, url: str) -> None: ...
 

@@ -48,7 +48,7 @@ class NoticeSources:
     read_notes: Callable[[], Mapping[Path, UnattendedRun]] = dict
     """Notes on runs in the folder that nobody followed, by their files."""
     today: Callable[[], datetime.date] = datetime.date.today
-    clock: Callable[[], float] = time.monotonic
+    clock: Callable[[], float] = time.perf_counter
 
 
 class NoticeList:

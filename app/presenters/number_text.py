@@ -3,7 +3,7 @@
 import math
 
 from analysis import formatting
-from analysis.catalogue import Unit
+from analysis.catalogue import Unit, displacement_decimals, displacement_unit
 from analysis.formatting import MINUS, format_value, typeset, with_unit
 from analysis.quantities import Quantity
 from messages.message import MessageError
@@ -48,6 +48,16 @@ def format_uncertain(quantity: Quantity) -> tuple[str, str]:
 def format_in(unit: Unit, value: float, decimals: int = 1) -> str:
     """Write an SI value with its unit; a dash for NaN."""
     return with_unit(typeset(unit.number(value, decimals)), unit.symbol)
+
+
+def displacement_number(value_m: float, decimals: int = 1) -> str:
+    """Write a displacement (m) in the unit of the screens, to so many `decimals` of a millimetre."""
+    return typeset(displacement_unit().number(value_m, displacement_decimals(decimals)))
+
+
+def format_displacement(value_m: float, decimals: int = 1) -> str:
+    """Write a displacement (m) with the unit of the screens, as `displacement_number`."""
+    return with_unit(displacement_number(value_m, decimals), displacement_unit().symbol)
 
 
 def format_fixed(value: float, decimals: int) -> str:

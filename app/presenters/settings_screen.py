@@ -5,9 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from analysis.catalogue import DISPLACEMENT_UNITS
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
-from config.schema import ConfigError, Settings
+from config.schema import ConfigError, Settings, Stand
 from messages.i18n import N_, gettext
 from messages.message import message_of
 
@@ -15,6 +16,7 @@ CHOICES: dict[str, dict[Any, str]] = {
     "theme": {"system": N_("As the system"), "light": N_("Light"), "dark": N_("Dark")},
     "language": {"system": N_("As the system"), "en": "English", "ru": "Русский"},
     "scale": {scale: f"{scale:.0%}" for scale in (1.0, 1.25, 1.5, 1.75, 2.0)},
+    "displacement_unit": {name: unit.symbol for name, unit in DISPLACEMENT_UNITS.items()},
     "log_level": {
         "error": N_("Errors only"),
         "warning": N_("Errors and warnings"),
@@ -23,7 +25,19 @@ CHOICES: dict[str, dict[Any, str]] = {
     },
 }
 """Values of settings and their titles."""
-_AT_START = ("language", "scale", "recordings", "log_level")  # settings that take effect after a restart
+_AT_START = (
+    "language",
+    "scale",
+    "displacement_unit",
+    "recordings",
+    "log_level",
+)  # settings that take effect after a restart
+
+
+@dataclass(frozen=True, slots=True)
+class SettingsFile:
+    name: str
+    path: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +47,7 @@ class SettingsState:
     can_undo: bool = False
     message: Chip = EMPTY_CHIP
     """Fault of the last change."""
-
-
-@dataclass(frozen=True, slots=True)
-class SettingsFile:
-    name: str
-    path: str
+    files: tuple[SettingsFile, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +60,8 @@ class PersonalSettings:
     recordings: str = ""
     override: str = ""
     """Environment variable that overrides the folder; empty if none does."""
-    files: tuple[SettingsFile, ...] = ()
+    list_files: Callable[[], tuple[SettingsFile, ...]] = tuple
+    """Lists the files of settings that are in use: the laboratory's own, else the shipped ones."""
     save: Callable[[Settings], Path | None] = lambda _: None
     """Saves settings; returns the backup of an unreadable file, if there was one. Raises ConfigError."""
 
@@ -60,10 +70,14 @@ class SettingsPresenter(Presenter[SettingsState]):
     """Changes personal settings; `apply` applies new ones to the window."""
 
     def __init__(self, personal: PersonalSettings, apply: Callable[[Settings], None]) -> None:
-        super().__init__(SettingsState(personal.settings))
+        super().__init__(SettingsState(personal.settings, files=personal.list_files()))
         self.personal = personal
         self._apply = apply
         self._before: list[Settings] = []
+
+    def on_stand(self, _stand: Stand) -> None:
+        """Show another file, where the laboratory had none of its own before."""
+        self._update(files=self.personal.list_files())
 
     def change(self, **changes: Any) -> None:
         """Set fields of `Settings`, and save them; an invalid value changes nothing."""

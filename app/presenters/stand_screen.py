@@ -6,10 +6,10 @@ from typing import Any, Final
 
 import msgspec
 
-from analysis.catalogue import KILOGRAM, MILLIMETRE, MILLIRADIAN, MILLISECOND, PER_SECOND
+from analysis.catalogue import KILOGRAM, MILLIRADIAN, MILLISECOND, PER_SECOND
 from analysis.formatting import typeset, with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, Tone
-from app.presenters.number_text import format_in, normalize_number, parse_field
+from app.presenters.number_text import format_displacement, format_in, normalize_number, parse_field
 from app.presenters.results import sentence
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.effects import parse_effects
@@ -165,12 +165,12 @@ def truth_values(truth: Truth) -> tuple[LabelledValue, ...]:
         "f<sub>d</sub>": f"{stand.friction_dynamic:.5g}",
         "f<sub>s</sub>": f"{stand.friction_static:.5g}",
         gettext("tilt"): with_unit(typeset(f"{MILLIRADIAN.scale * stand.tilt_rad:.3g}"), MILLIRADIAN.symbol),
-        gettext("pullback"): format_in(MILLIMETRE, stand.pullback_m, 2),
+        gettext("pullback"): format_displacement(stand.pullback_m, 2),
         "T": format_in(MILLISECOND, stand.period_s, 2),
         "n<sub>1</sub>": with_unit(f"{stand.damping_n1_per_s:.4g}", PER_SECOND.symbol),
         gettext("table, plate"): with_unit(masses, KILOGRAM.symbol),
         **({gettext("effects"): _effects_text(effects)} if (effects := truth.options.effects) else {}),
-        gettext("slip of a release"): format_in(MILLIMETRE, truth.residual_displacement_m, 3),
+        gettext("slip of a release"): format_displacement(truth.residual_displacement_m, 3),
         gettext("releases"): releases,
         gettext("frames sent"): f"{wire.frames}",
         gettext("damaged, lost"): f"{wire.frames_damaged}, {wire.frames_lost}",

@@ -1,13 +1,15 @@
 """The Start screen: state and presenter. Connects to the simulated stand or an amplifier, or opens a run."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 
 from app.acquisition.messages import PortSettings
 from app.presenters.base import Presenter
 from app.presenters.navigator import ConnectForm, Navigator
 from app.presenters.number_text import FormError, parse_number
+from app.presenters.recent import RecentItems
+from config.schema import RecentDevice
 from drivers.driver import DeviceDriver
 from messages.i18n import gettext, translate
 
@@ -16,6 +18,8 @@ from messages.i18n import gettext, translate
 class PortChoice:
     url: str
     description: str = ""
+    usb: str = ""
+    """USB numbers, which stay where the name changes; empty for other ports."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +27,7 @@ class StartState:
     """State of the screen. `busy` names the work in progress, `connected` the connected device.
 
     `stopped_at` is the time of day of its last sample, if none comes any more.
+    `last_device` is name and port of the amplifier that was connected last, `runs` the paths of recent runs.
     """
 
     all_series: tuple[str, ...]
@@ -35,6 +40,10 @@ class StartState:
     busy: str = ""
     connected: str = ""
     stopped_at: str = ""
+    last_device: str = ""
+    last_form: ConnectForm | None = None
+    """Form that connects to the last amplifier."""
+    runs: tuple[str, ...] = ()
 
     @property
     def selected_protocol(self) -> DeviceDriver | None:
@@ -45,11 +54,19 @@ class StartPresenter(Presenter[StartState]):
     """Checks the form, and opens connections and runs; `ports` lists the serial ports of this computer."""
 
     def __init__(
-        self, state: StartState, navigator: Navigator, ports: Callable[[], tuple[PortChoice, ...]]
+        self,
+        state: StartState,
+        navigator: Navigator,
+        ports: Callable[[], tuple[PortChoice, ...]],
+        recent: RecentItems | None = None,
     ) -> None:
+        self._recent = recent or RecentItems()
+        if self._recent.device is not None:
+            state = replace(state, form=_recent_form(self._recent.device))
         super().__init__(state)
         self.navigator = navigator
         self._ports = ports
+        self._show_recent()
 
     def set_series(self, code: str) -> None:
         if code in self.state.all_series:
@@ -59,8 +76,27 @@ class StartPresenter(Presenter[StartState]):
         if not self.state.busy:
             self.navigator.open_simulated(self.state.series)
 
-    def refresh_ports(self) -> None:
+    def refresh(self) -> None:
+        """List ports and recent items anew."""
         self._update(ports=self._ports())
+        self._show_recent()
+
+    def open_run(self, path: str) -> None:
+        self.navigator.open_run(path)
+
+    def connect_last(self) -> None:
+        """Connect the last amplifier, also where its USB port has another name now."""
+        device = self._recent.device
+        if device is not None:
+            form = _recent_form(device)
+            self.set_form(replace(form, port=_present_port(device, self._ports())))
+            self.connect()
+
+    def remember_device(self, name: str, port: PortSettings) -> None:
+        """Keep what is connected now as the last amplifier."""
+        usb = next((choice.usb for choice in self.state.ports if choice.url == port.url), "")
+        self._recent.set_device(RecentDevice(name=name, usb=usb, **asdict(connect_form(port))))
+        self._show_recent()
 
     def set_form(self, form: ConnectForm) -> None:
         self._update(form=form, form_error="")
@@ -84,6 +120,14 @@ class StartPresenter(Presenter[StartState]):
     def set_stopped(self, stopped_at: str) -> None:
         self._update(stopped_at=stopped_at)
 
+    def _show_recent(self) -> None:
+        device, runs = self._recent.device, self._recent.runs
+        if device is None:
+            self._update(last_device="", last_form=None, runs=runs)
+            return
+        last = gettext("{device} on {port}", device=device.name, port=device.port)
+        self._update(last_device=last, last_form=_recent_form(device), runs=runs)
+
 
 def port_settings(form: ConnectForm) -> PortSettings:
     """Settings of a port. Raises FormError."""
@@ -99,6 +143,30 @@ def port_settings(form: ConnectForm) -> PortSettings:
         device=_settings(form.settings),
         relative_url=form.relative_port.strip(),
     )
+
+
+def connect_form(port: PortSettings) -> ConnectForm:
+    """Form that `port_settings` reads as these settings."""
+    return ConnectForm(
+        port=port.url,
+        protocol=port.protocol,
+        baud="" if port.baud is None else str(port.baud),
+        rate_hz="" if port.rate_hz is None else repr(port.rate_hz),
+        parity=port.parity or "N",
+        stop_bits=str(port.stop_bits or 1),
+        settings=" ".join(f"{key}={value}" for key, value in port.device.items()),
+        relative_port=port.relative_url,
+    )
+
+
+def _recent_form(device: RecentDevice) -> ConnectForm:
+    return ConnectForm(**{name: getattr(device, name) for name in ConnectForm.__dataclass_fields__})
+
+
+def _present_port(device: RecentDevice, ports: Sequence[PortChoice]) -> str:
+    """Address of the port of a device now: where its adapter is another one by name, if only one is alike."""
+    alike = [port.url for port in ports if port.usb and port.usb == device.usb]
+    return alike[0] if len(alike) == 1 else device.port
 
 
 def _settings(text: str) -> dict[str, str]:

@@ -25,8 +25,10 @@ from app.presenters.device_status import DeviceStatus
 from app.presenters.error_reports import ErrorReporter
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.report import ReportPresenter
 from app.presenters.navigator import ConnectForm, StandContext
 from app.presenters.notices import NoticeCause, NoticeList, NoticeSources
+from app.presenters.recent import RecentItems
 from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import AnalysisFailed, AnalysisProgress, Connecting, Notification
 from app.presenters.recovery import RecoveryReport
@@ -36,10 +38,11 @@ from app.presenters.runs.state import RunFilter
 from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings, SettingsPresenter
 from app.presenters.stand_screen import StandPresenter
+from app.presenters.stand_settings import StandSettingsPresenter
 from app.presenters.start_screen import PortChoice, StartPresenter, StartState
 from app.presenters.worker import LazyModule, Worker, WorkerPool
 from app.simulated_stand.options import SimulatedStandOptions
-from config.schema import Gauges, Settings
+from config.schema import Gauges, Settings, Stand
 from messages.i18n import N_, gettext
 
 if TYPE_CHECKING:
@@ -48,15 +51,19 @@ else:
     analysis_task = LazyModule("app.presenters.analysis_task")
 
 
+NAME = "Slipstand"
+
+
 @dataclass(frozen=True, slots=True)
 class WindowState:
-    """Shown screen, notice above it, theme (`system`, `light`, `dark`); the window ends if `is_closing`."""
+    """Shown screen, notice above it, theme (`system`, `light`, `dark`), title; `is_closing` ends it."""
 
     screen: Screen = Screen.START
     notice: Notice | None = None
     more_notices: int = 0  # that wait behind it
     theme: str = "system"
     is_closing: bool = False
+    title: str = NAME
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +74,9 @@ class WindowContext:
     simulation: SimulatedStandOptions = field(default_factory=SimulatedStandOptions)
     list_ports: Callable[[], tuple[PortChoice, ...]] = tuple
     notices: NoticeSources = field(default_factory=NoticeSources)
+    recent: RecentItems = field(default_factory=RecentItems)
+    save_stand: Callable[[Stand], Path] = lambda _: Path()
+    """Stores another stand, and returns its file. Raises ConfigError."""
 
 
 class WindowPresenter(Presenter[WindowState]):
@@ -91,25 +101,34 @@ class WindowPresenter(Presenter[WindowState]):
         self._pool = pool
         self._notices = NoticeList(context.notices, self._show_notice)
         self._folder = str(context.stand.directory)
+        self._recent = context.recent
         self._open_again: Callable[[], None] | None = None
         self._open_stand_instead: Callable[[], None] | None = None
-        self._amplifier = ""  # connected or being connected; empty without one, and with a simulated stand
+        self._port: PortSettings | None = None
+        """Port of the amplifier that is connected or being connected; None for the simulated stand."""
         self._device = DeviceStatus()
         self._true_friction: float | None = None
         self._true_frictions: dict[str, float | None] = {}
         stand, author = context.stand, getpass.getuser()
         runs, batch = pool.make_worker(), pool.make_worker()
-        self.start = StartPresenter(context.start, self, context.list_ports)
+        self.start = StartPresenter(context.start, self, context.list_ports, self._recent)
         self.record = RecordPresenter(connection, stand, pool.make_worker(), author, self.count_simulated)
-        self.identify = IdentifyPresenter(analysis)
+        self.identify = IdentifyPresenter(analysis, ReportPresenter(pool.make_worker(), self._recent))
         self.gauges = GaugesPresenter(pool.make_worker(), pool.make_worker(), stand.gauges, self)
         connection.add_row_listener(self.gauges.on_rows)
         self.stand = StandPresenter(
             context.simulation, context.start.all_series, self.open_stand, lambda: connection.stand
         )
-        self.runs = RunsPresenter(runs, batch, self._folder, stand.all_series, author, self.open_run)
-        self.campaign = CampaignPresenter(pool.make_worker(), self._folder, stand.all_series, author, self)
+        self.runs = RunsPresenter(
+            runs, batch, self._folder, stand.all_series, author, self.open_run, self._recent
+        )
+        self.campaign = CampaignPresenter(
+            pool.make_worker(), self._folder, stand.all_series, author, self, self._recent
+        )
         self.settings = SettingsPresenter(context.personal, self._apply_settings)
+        self.stand_settings = StandSettingsPresenter(
+            stand.stand, context.save_stand, self._apply_stand, lambda: self.record.is_recording
+        )
         self.presenters: dict[Screen, Presenter[Any]] = {screen: getattr(self, screen) for screen in Screen}
         self._apply_settings(context.personal.settings)
         if context.personal.fault:
@@ -160,11 +179,11 @@ class WindowPresenter(Presenter[WindowState]):
         waiting_for = gettext("Starting the simulated stand")
         start = partial(self._connection.open_simulated, options)
         open_it = partial(self._connect, gettext("Simulated stand"), waiting_for, start)
-        if not self._amplifier or self.record.is_recording:
+        if self._port is None or self.record.is_recording:
             open_it()
             return
         self._open_stand_instead = open_it
-        device = self.start.state.connected or self._amplifier
+        device = self.start.state.connected or self._port.url
         text = gettext("{device} is connected. The simulated stand would take its place", device=device)
         dismiss = N_("Keep the amplifier")
         question = Notice(text, Tone.WARN, NoticeAction.SIMULATE, dismiss, is_question=True)
@@ -172,8 +191,12 @@ class WindowPresenter(Presenter[WindowState]):
 
     def open_port(self, port: PortSettings) -> None:
         waiting_for = gettext("Connecting to {port}", port=port.url)
-        open_it = partial(self._connection.open_port, port)
-        self._connect(port.url, waiting_for, open_it, amplifier=port.url)
+        self._connect(port.url, waiting_for, partial(self._connection.open_port, port), port)
+
+    def connect_at_start(self) -> None:
+        """Connect the last amplifier, if that is a setting."""
+        if self.settings.state.settings.connect_at_start:
+            self.start.connect_last()
 
     def close_connection(self) -> None:
         if not self._refuse_while_recording():
@@ -182,6 +205,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def open_run(self, path: str) -> None:
         path = str(Path(path).absolute())
+        self._recent.add_run(path)
         self.identify.on_opening(path)
         self.show_screen(Screen.IDENTIFY)
         self._notices.on_run_opened(path)
@@ -198,6 +222,10 @@ class WindowPresenter(Presenter[WindowState]):
 
     def show_start(self) -> None:
         self.show_screen(Screen.START)
+
+    def connect_device(self, form: ConnectForm) -> None:
+        self.start.set_form(form)
+        self.start.connect()
 
     def fill_connection(self, form: ConnectForm) -> None:
         self.start.set_form(form)
@@ -236,6 +264,7 @@ class WindowPresenter(Presenter[WindowState]):
         self._follow_device()
         self._notices.follow(is_recording=self.record.is_recording)
         self._analysis.poll()
+        self._update(title=self._title())
 
     def close(self) -> None:
         self._connection.close()
@@ -243,6 +272,13 @@ class WindowPresenter(Presenter[WindowState]):
         for presenter in self.presenters.values():
             presenter.close()
         self._pool.close()
+
+    def _title(self) -> str:
+        """Run, device and state of the recording; on Identify the run that is shown there."""
+        parts, shown = self.record.state.title, Path(self.identify.state.title).stem
+        if self.state.screen is Screen.IDENTIFY and shown not in ("", *parts):
+            parts = (shown, *parts)
+        return " \u2013 ".join((*parts, NAME))
 
     def _apply_settings(self, settings: Settings) -> None:
         self.record.dispatch(settings)
@@ -253,14 +289,21 @@ class WindowPresenter(Presenter[WindowState]):
         if self.settings.state.message.tone is not Tone.BAD:  # they were saved
             self._notices.withdraw(NoticeCause.SETTINGS)
 
+    def _apply_stand(self, stand: Stand) -> None:
+        for presenter in self.presenters.values():
+            presenter.on_stand(stand)
+        if self._connection.is_active:
+            text = gettext("The stand has changed. Connect again, so that runs are recorded with it")
+            self._notices.put(NoticeCause.CONNECTION, Notice(text, Tone.WARN, NoticeAction.RECONNECT))
+
     def _connect(
-        self, device: str, waiting_for: str, open_it: Callable[[], None], amplifier: str = ""
+        self, device: str, waiting_for: str, open_it: Callable[[], None], port: PortSettings | None = None
     ) -> None:
         if self._refuse_while_recording():
             return
-        self._open_again = partial(self._connect, device, waiting_for, open_it, amplifier)
+        self._open_again = partial(self._connect, device, waiting_for, open_it, port)
         self._forget_connection()
-        self._amplifier = amplifier
+        self._port = port
         self.start.set_busy(waiting_for)
         self.record.dispatch(Connecting(device, waiting_for))
         self.gauges.on_connecting(device)
@@ -276,7 +319,7 @@ class WindowPresenter(Presenter[WindowState]):
 
     def _forget_connection(self) -> None:
         self._true_friction = None
-        self._amplifier = ""
+        self._port = None
         self._notices.withdraw(NoticeCause.REPLACING)
         self.record.dispatch(Notification.DISCONNECTED)
         self.gauges.on_disconnected()
@@ -302,6 +345,8 @@ class WindowPresenter(Presenter[WindowState]):
             self._notices.withdraw(NoticeCause.CLOSING)
         if isinstance(event, Connected):
             self.start.set_connected(event.device)
+            if self._port is not None:
+                self.start.remember_device(event.device, self._port)
             self.gauges.on_connected(event)
         elif isinstance(event, RunEnded):
             self._on_run_ended(event)
@@ -315,6 +360,7 @@ class WindowPresenter(Presenter[WindowState]):
             tone = Tone.WARN if event.ended.is_normal else Tone.BAD
             self._notices.put_failure(NoticeCause.RUN, Notice(sentence(event.message), tone))
         if event.path:
+            self._recent.add_run(event.path)
             self._true_frictions[event.path] = self._true_friction
             self.identify.on_opening(event.path)
             self._analyse(event.path)
@@ -353,6 +399,8 @@ class WindowPresenter(Presenter[WindowState]):
         self.identify.on_analysed(run, self._true_frictions.get(str(run.path)))
 
     def _on_analysis_failed(self, path: str, failure: TaskFailure) -> None:
+        if not Path(path).exists():
+            self._recent.remove_runs((path,))
         self.record.dispatch(AnalysisFailed(path, failure.message))
         self.identify.on_failed(path, failure.message)
 

@@ -13,6 +13,7 @@ from functools import partial
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar, TypeVarTuple, overload
 
+from analysis.catalogue import Unit, displacement_unit, use_displacement_unit
 from app.log import start_log
 from app.presenters.base import ReportProgress, TaskFailure
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
@@ -237,7 +238,7 @@ class _TaskProcess:
         child_lifeline, self._lifeline = context.Pipe(duplex=False)
         # The interpreter joins its children at exit: they must end even if nobody calls `close`.
         atexit.register(self._lifeline.close)
-        arguments = (child_pipe, child_lifeline, language())
+        arguments = (child_pipe, child_lifeline, language(), displacement_unit())
         self._process: BaseProcess = context.Process(target=_serve, args=arguments, name="slipstand-analysis")
         self._process.start()
         child_pipe.close()
@@ -294,9 +295,10 @@ class _TaskProcess:
         self._lifeline.close()
 
 
-def _serve(pipe: PipeEnd, lifeline: PipeEnd, language_code: str) -> None:
+def _serve(pipe: PipeEnd, lifeline: PipeEnd, language_code: str, unit: Unit) -> None:
     start_log("worker")
     use_language(language_code)
+    use_displacement_unit(unit)
     exit_with_parent(lifeline, _GRACE_S)
     report = (lambda progress: pipe.send(("progress", progress)),)
     with contextlib.suppress(EOFError, OSError):

@@ -8,6 +8,7 @@ import sys
 from PySide6.QtCore import QLibraryInfo, QLocale, QTimer, QTranslator
 from PySide6.QtWidgets import QApplication, QMessageBox
 
+from analysis.catalogue import DISPLACEMENT_UNITS, use_displacement_unit
 from app.child_process import end_signals
 from app.log import start_log
 from app.presenters.composition import make_window_presenter, read_personal
@@ -54,7 +55,8 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
 
 
 def _use(settings: Settings) -> None:
-    """Choose language and size; SLIPSTAND_LANGUAGE is preferred to the settings."""
+    """Choose language, unit and size; SLIPSTAND_LANGUAGE is preferred to the settings."""
+    use_displacement_unit(DISPLACEMENT_UNITS[settings.displacement_unit])
     of_system = QLocale.system().name().partition("_")[0]
     chosen = of_system if settings.language == "system" else settings.language
     use_language(os.environ.get(LANGUAGE_VARIABLE, chosen))
@@ -90,6 +92,7 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     window.show()
     if simulated is None:
         QTimer.singleShot(0, window, window.show_last_screen)
+        QTimer.singleShot(0, window, presenter.connect_at_start)
     else:
         QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)

@@ -1,5 +1,7 @@
 """View of the Settings screen: look, recording, and the files of the other settings."""
 
+from collections.abc import Callable
+
 from PySide6.QtCore import QUrl
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QPushButton, QWidget
@@ -17,6 +19,7 @@ from app.qt.widgets.inputs import CheckBox, ComboBox, ask_for_folder, make_butto
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
+    clear,
     make_card,
     make_column,
     make_form_grid,
@@ -31,7 +34,9 @@ _WIDTH = 760
 
 
 class SettingsScreen(QWidget):
-    def __init__(self, presenter: SettingsPresenter) -> None:
+    """Draws `SettingsState`; `edit_stand` opens the settings of the stand."""
+
+    def __init__(self, presenter: SettingsPresenter, edit_stand: Callable[[], None] = lambda: None) -> None:
         super().__init__()
         self._presenter = presenter
         self._choices = {name: self._choice(name) for name in CHOICES}
@@ -40,7 +45,11 @@ class SettingsScreen(QWidget):
         self._recordings.setPlaceholderText(presenter.personal.recordings)
         self._sounds = CheckBox(gettext("Sound at each state of a pullback"))
         self._simulated = CheckBox(gettext("Simulated runs count in the plan and on Campaign"))
+        self._connects = CheckBox(gettext("Connect to the last amplifier at the start"))
+        self._stand = make_button(gettext("Edit the stand…"), edit_stand)
         self._undo = make_button(gettext("Undo"), presenter.undo)
+        self._files = QGridLayout()
+        self._shown_files: tuple[SettingsFile, ...] = ()
         self._message = label(wrap=True)
         self._waits = label(wrap=True)
         self._lay_out()
@@ -50,18 +59,25 @@ class SettingsScreen(QWidget):
         self._recordings.editingFinished.connect(self._write_folder)
         self._sounds.clicked.connect(lambda checked: presenter.change(sounds=checked))
         self._simulated.clicked.connect(lambda checked: presenter.change(count_simulated=checked))
+        self._connects.clicked.connect(lambda checked: presenter.change(connect_at_start=checked))
+        words = gettext("Masses, pullbacks, contacts and added masses of the stand")
+        bind_button(self._stand, "Alt+E", words, self)
         bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), self)
 
     def show_state(self, state: SettingsState) -> None:
         settings = state.settings
+        if state.files != self._shown_files:
+            self._shown_files = state.files
+            self._show_files(state.files)
         for name, choice in self._choices.items():
             choice.setCurrentIndex(choice.findData(getattr(settings, name)))
         show_texts({"operator": self._operator, "recordings": self._recordings}, settings)
         self._sounds.setChecked(settings.sounds)
         self._simulated.setChecked(settings.count_simulated)
+        self._connects.setChecked(settings.connect_at_start)
         self._undo.setEnabled(state.can_undo)
         show_chip(self._message, state.message)
-        waits = gettext("Language, size, folder and log change at the next start")
+        waits = gettext("Language, size, unit, folder and log change at the next start")
         show_chip(self._waits, Chip(waits if state.needs_restart else "", Tone.WARN))
 
     def _choice(self, name: str) -> ComboBox:
@@ -101,6 +117,7 @@ class SettingsScreen(QWidget):
             (gettext("Theme"), self._choices["theme"]),
             (gettext("Language"), self._choices["language"]),
             (gettext("Size"), self._choices["scale"]),
+            (gettext("Displacements in"), self._choices["displacement_unit"]),
         )
         return _card(gettext("Look"), "", make_form_grid(fields, wide=False))
 
@@ -113,20 +130,23 @@ class SettingsScreen(QWidget):
         grid = make_form_grid(fields)
         self._recordings.setAccessibleName(gettext("Folder of the runs"))
         in_use = label(_folder_words(self._presenter.personal), muted=True, wrap=True)
-        return _card(gettext("Recording"), "", grid, in_use, self._sounds, self._simulated)
+        switches = self._sounds, self._simulated, self._connects
+        return _card(gettext("Recording"), "", grid, in_use, *switches)
 
     def _files_card(self) -> QFrame:
         hint = gettext("Stand and gauges are read when the window starts or a device is connected.")
-        files = QGridLayout()
-        files.setHorizontalSpacing(12)
-        files.setVerticalSpacing(8)
-        files.setColumnStretch(1, 1)
-        for row, file in enumerate(self._presenter.personal.files):
-            files.addWidget(label(gettext(file.name)), row, 0)
-            files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
-            files.addWidget(_open_button(file), row, 2)
-        log = make_form_grid(((gettext("Log"), self._choices["log_level"]),), wide=False)
-        return _card(gettext("Files"), hint, files, log)
+        self._files.setHorizontalSpacing(12)
+        self._files.setVerticalSpacing(8)
+        self._files.setColumnStretch(1, 1)
+        more = ((gettext("Stand"), self._stand), (gettext("Log"), self._choices["log_level"]))
+        return _card(gettext("Files"), hint, self._files, make_form_grid(more, wide=False))
+
+    def _show_files(self, files: tuple[SettingsFile, ...]) -> None:
+        clear(self._files)
+        for row, file in enumerate(files):
+            self._files.addWidget(label(gettext(file.name)), row, 0)
+            self._files.addWidget(label(break_path(file.path), muted=True, wrap=True), row, 1)
+            self._files.addWidget(_open_button(file), row, 2)
 
 
 def _card(title: str, hint: str, *parts: Item) -> QFrame:

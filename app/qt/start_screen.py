@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
@@ -9,6 +10,7 @@ from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QLineEdit, QPushButton,
 
 from app.presenters.base import Chip, Tone
 from app.presenters.navigator import ConnectForm
+from app.presenters.recent import RUNS_MAX
 from app.presenters.start_screen import StartPresenter, StartState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox, make_button, show_texts
@@ -22,33 +24,47 @@ from app.qt.widgets.layouts import (
     make_scroll_area,
 )
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import break_path, label, show_chip
+from app.qt.widgets.text import break_path, label, padded, set_text_or_hide, show_chip
 from drivers.driver import UNVERIFIED
 from messages.i18n import N_, gettext
 
 _CARD_WIDTHS, _CARD_HEIGHT = (256, 296), 344
+_NAME_WIDTH = 200
 _PARITIES = {"N": N_("none"), "E": N_("even"), "O": N_("odd")}
 
 
 class StartScreen(QWidget):
-    def __init__(self, presenter: StartPresenter, ask_for_run: Callable[[], None]) -> None:
+    """Draws `StartState`; `ask_for_run` and `find_amplifier` open dialogs."""
+
+    def __init__(
+        self,
+        presenter: StartPresenter,
+        ask_for_run: Callable[[], None],
+        find_amplifier: Callable[[], None] = lambda: None,
+    ) -> None:
         super().__init__()
         self._presenter = presenter
         self._series = ComboBox()
         large_button = partial(make_button, large=True)
         self._try = large_button(gettext("Try with the simulated stand"), presenter.start_simulation)
         self._form = _Form(presenter)
+        self._last_name = label(role=TextRole.STRONG, wrap=True)
+        self._last = make_button(gettext("Connect again"), presenter.connect_last, large=True, primary=True)
+        self._find = make_button(gettext("Find my amplifier"), find_amplifier)
         self._connect = large_button(gettext("Connect my amplifier"), presenter.connect)
         self._verified = label(muted=True, wrap=True)
         self._error = label(wrap=True)
         self._open = large_button(gettext("Open a recording"), ask_for_run)
         self._folder = label(muted=True, wrap=True)
+        self._runs = _RecentRuns(presenter.open_run)
         self._status = label(role=TextRole.HEADING)
         self._disconnect = large_button(gettext("Disconnect"), presenter.navigator.close_connection)
         self._series.activated.connect(lambda _: presenter.set_series(self._series.currentText()))
         self._lay_out()
         for button, keys, words in (
             (self._try, "Alt+S", gettext("Start the simulated stand and connect to it")),
+            (self._last, "Alt+A", gettext("Connect to the amplifier that was connected last")),
+            (self._find, "Alt+F", gettext("Look at every free port for a device that is known")),
             (self._connect, "Alt+C", gettext("Connect to the amplifier as filled in")),
             (self._disconnect, "Alt+D", gettext("Let go of the device")),
         ):
@@ -67,14 +83,15 @@ class StartScreen(QWidget):
         self._folder.setText(gettext("Runs are stored in {folder}", folder=break_path(state.recordings)))
         show_chip(self._status, _connection_chip(state))
         self._disconnect.setVisible(bool(state.connected))
-        for button in (self._try, self._connect):
+        set_text_or_hide(self._last_name, state.last_device)
+        self._last.setVisible(bool(state.last_device))
+        self._runs.show_runs(state.runs)
+        for button in (self._try, self._last, self._connect):
             button.setEnabled(not state.busy)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         super().showEvent(event)
-        self._presenter.refresh_ports()
-        is_connected = bool(self._presenter.state.connected)
-        (self._open if is_connected else self._try).setFocus()
+        self._presenter.refresh()
 
     def _lay_out(self) -> None:
         cards = make_row(
@@ -87,12 +104,12 @@ class StartScreen(QWidget):
         )
         cards.addStrut(_CARD_HEIGHT)
         motto = gettext("Pull the table back, let go, read the friction coefficient.")
-        title = _centred("Slipstand", TextRole.INSTRUCTION)
+        title = _centred("Slipstand", TextRole.NUMBER)
         status = make_row(STRETCH, self._status, self._disconnect, STRETCH, spacing=12)
         page = QWidget()
-        layout = make_column(STRETCH, title, spacing=16, margins=(24, 24), of=page)
+        layout = make_column(STRETCH, title, spacing=12, margins=(24, 16), of=page)
         layout.addWidget(_centred(motto, TextRole.HEADING))
-        layout.addSpacing(16)
+        layout.addSpacing(4)
         layout.addLayout(cards)
         layout.addLayout(status)
         layout.addStretch(2)
@@ -102,16 +119,43 @@ class StartScreen(QWidget):
         hint = gettext("No amplifier needed: a stand is simulated and read through a port like a real one.")
         series = make_form_grid([(gettext("Series"), self._series)])
         self._series.setAccessibleName(gettext("Series of the simulated stand"))
-        return _card(gettext("Simulated stand"), hint, series, STRETCH, self._try)
+        return _card(gettext("Simulated stand"), hint, series, self._try, STRETCH)
 
     def _amplifier_card(self) -> QFrame:
         hint = gettext("Both gauges, read through a serial port or the network.")
-        parts = (self._form, self._verified, self._error, STRETCH, self._connect)
+        last = make_column(self._last_name, self._last, spacing=6)
+        parts = (last, self._find, self._form, self._verified, self._error, self._connect, STRETCH)
         return _card(gettext("My amplifier"), hint, *parts)
 
     def _recording_card(self) -> QFrame:
         hint = gettext("Look at a run again: record against simulation, and what was found.")
-        return _card(gettext("Recordings"), hint, self._folder, STRETCH, self._open)
+        return _card(gettext("Recordings"), hint, self._folder, self._open, self._runs, STRETCH)
+
+
+class _RecentRuns(QWidget):
+    """Buttons of the runs that were recorded or opened last."""
+
+    def __init__(self, open_run: Callable[[str], None]) -> None:
+        super().__init__()
+        self._open_run = open_run
+        self._paths: tuple[str, ...] = ()
+        self._buttons = [make_button("", partial(self._open, number)) for number in range(RUNS_MAX)]
+        for button in self._buttons:
+            button.setProperty("role", "row")
+        make_column(label(gettext("Recent runs"), TextRole.STRONG), *self._buttons, spacing=2, of=self)
+
+    def show_runs(self, paths: tuple[str, ...]) -> None:
+        self._paths = paths
+        self.setVisible(bool(paths))
+        for button, path in zip(self._buttons, padded(paths, RUNS_MAX, ""), strict=True):
+            name, metrics = Path(path).stem, button.fontMetrics()
+            button.setText(metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, _NAME_WIDTH))
+            button.setAccessibleName(gettext("Open {name}", name=name))
+            button.setToolTip(path)
+            button.setVisible(bool(path))
+
+    def _open(self, number: int) -> None:
+        self._open_run(self._paths[number])
 
 
 class _Form(QWidget):
@@ -163,7 +207,8 @@ class _Form(QWidget):
         show_texts(self._fields, form)
         self._parity.setCurrentIndex(list(_PARITIES).index(form.parity))
         self._stop_bits.setCurrentText(form.stop_bits)
-        if form.settings or form.relative_port or (form.parity, form.stop_bits) != ("N", "1"):
+        has_rare = form.settings or form.relative_port or (form.parity, form.stop_bits) != ("N", "1")
+        if has_rare and form != state.last_form:  # those of the last device need not be looked at
             self._more.setChecked(True)
         usual = state.selected_protocol.default_baud if state.selected_protocol else None
         self._fields["baud"].setPlaceholderText(f"{usual}" if usual else gettext("the protocol's usual one"))

@@ -1,7 +1,8 @@
 """The main window: side bar, notice, and the screens, each built when first shown."""
 
 import importlib
-from typing import Any, cast
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
 
 from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QCloseEvent, QFontDatabase, QGuiApplication, QHideEvent
@@ -10,7 +11,6 @@ from PySide6.QtWidgets import (
     QDialog,
     QFileDialog,
     QFrame,
-    QMainWindow,
     QPlainTextEdit,
     QStackedWidget,
     QToolButton,
@@ -21,6 +21,8 @@ from shiboken6 import isValid
 from app.presenters.base import Notice
 from app.presenters.screens import Screen
 from app.presenters.window import WindowPresenter, WindowState
+from app.qt.keyboard import KeyboardWindow
+from app.qt.menu import fill_menu
 from app.qt.settings_screen import SettingsScreen
 from app.qt.stand_screen import StandScreen
 from app.qt.start_screen import StartScreen
@@ -34,12 +36,15 @@ from app.qt.window_geometry import WindowGeometry
 from config.schema import WindowLayout
 from messages.i18n import N_, gettext
 
+if TYPE_CHECKING:  # its import loads drivers, which the first paint does without
+    from app.qt.find_dialog import FindDialog
+
 TICK_MS = 16
 _SMALLEST = QSize(1024, 640)
 _AT_FOOT = (Screen.SETTINGS,)
 
 
-class MainWindow(QMainWindow):
+class MainWindow(KeyboardWindow):
     """Shows `WindowState`; a timer calls the presenter's `tick`. The presenter is closed with the window."""
 
     closed = Signal(WindowLayout)
@@ -51,17 +56,19 @@ class MainWindow(QMainWindow):
         self._geometry = WindowGeometry(place or WindowLayout())
         self._shown = presenter.state
         self._screens: dict[Screen, QWidget] = {}
+        self._find: FindDialog | None = None
+        self._stand: QDialog | None = None
         self._export: QDialog | None = None
         self._import: QDialog | None = None
         self._help: QDialog | None = None
         self._stack = QStackedWidget()
         self._notice = NoticeBar(presenter)
         self._rail = {screen: self._rail_button(screen) for screen in Screen}
+        self._menu = self._menu_button()
         self._lay_out()
         self._add_keys()
         theme.changed.connect(self._restyle)
         self._restyle()
-        self.setWindowTitle("Slipstand")
         self.setMinimumSize(self._geometry.within_screen(_SMALLEST))
         self._geometry.restore_window(self)
         presenter.attach(self)
@@ -74,11 +81,18 @@ class MainWindow(QMainWindow):
         old, self._shown = self._shown, state
         if state.theme != old.theme:
             self._theme.fix(SCHEMES[state.theme])
-        self._stack.setCurrentWidget(self._screen(state.screen))
+        screen = self._screen(state.screen)
+        if self._stack.currentWidget() is not screen or state.screen is not old.screen:
+            self._stack.setCurrentWidget(screen)
+            self.focus_home()
         self._rail[state.screen].setChecked(True)
         self._notice.show_notice(state.notice, state.more_notices)
         if state.is_closing and not old.is_closing:
             QTimer.singleShot(0, self, self.close)
+        self.setWindowTitle(state.title)
+
+    def home(self) -> QWidget | None:
+        return self._stack.currentWidget()
 
     def show_last_screen(self) -> None:
         """Show the screen of the last session, unless another one is shown by now."""
@@ -95,11 +109,25 @@ class MainWindow(QMainWindow):
         dialog.fileSelected.connect(self._presenter.open_run)
         dialog.open()
 
+    def find_amplifier(self) -> None:
+        from app.qt.find_dialog import FindDialog
+
+        if self._find is None:
+            self._find = FindDialog(self._presenter.gauges.ports, self)
+        self._find.look()
+
     def ask_for_export(self) -> None:
+        """Export the runs that are selected on Runs."""
+        if self._presenter.runs.open_export():
+            self._show_export()
+
+    def export_run(self, path: str) -> None:
+        self._presenter.runs.export_dialog.open((path,), str(Path(path).parent))
+        self._show_export()
+
+    def _show_export(self) -> None:
         from app.qt.runs.export_dialog import ExportDialog
 
-        if not self._presenter.runs.open_export():
-            return
         if self._export is None:
             self._export = ExportDialog(self._presenter.runs.export_dialog, self)
             self._presenter.runs.export_dialog.attach(self._export)
@@ -114,6 +142,15 @@ class MainWindow(QMainWindow):
             self._presenter.runs.import_dialog.attach(self._import)
         self._import.show()
         self._import.raise_()
+
+    def edit_stand(self) -> None:
+        from app.qt.stand_settings_dialog import StandSettingsDialog
+
+        if self._stand is None:
+            self._stand = StandSettingsDialog(self._presenter.stand_settings, self)
+            self._presenter.stand_settings.attach(self._stand)
+        self._stand.show()
+        self._stand.raise_()
 
     def show_help(self) -> None:
         if self._help is not None:
@@ -142,6 +179,8 @@ class MainWindow(QMainWindow):
     def _screen(self, screen: Screen) -> QWidget:
         if screen not in self._screens:
             self._screens[screen] = made = self._build_screen(screen)
+            made.setAccessibleName(gettext(screen.label))
+            made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # without one Qt looks for another at the start
             self._stack.addWidget(made)
             self._geometry.restore_parts(made)
         return self._screens[screen]
@@ -149,33 +188,38 @@ class MainWindow(QMainWindow):
     def _build_screen(self, screen: Screen) -> QWidget:
         """Build the view of a screen; one in a folder is imported now, since its plots load pyqtgraph."""
         window, presenter = self._presenter, self._presenter.presenters[screen]
-        links = {Screen.RECORD: window.show_start, Screen.IDENTIFY: self.ask_for_run, Screen.RUNS: self}
+        links: dict[Screen, tuple[Any, ...]] = {
+            Screen.RECORD: (window.show_start,),
+            Screen.IDENTIFY: (self.ask_for_run, self.export_run),
+            Screen.RUNS: (self,),
+        }
         view: Any
         match screen:
             case Screen.START:
-                view = StartScreen(window.start, self.ask_for_run)
+                view = StartScreen(window.start, self.ask_for_run, self.find_amplifier)
             case Screen.STAND:
                 view = StandScreen(window.stand)
             case Screen.SETTINGS:
-                view = SettingsScreen(window.settings)
+                view = SettingsScreen(window.settings, self.edit_stand)
             case _:
                 module = importlib.import_module(f"app.qt.{screen}.screen")
-                more = (links[screen],) if screen in links else ()
+                more = links.get(screen, ())
                 view = getattr(module, f"{screen.capitalize()}Screen")(self._theme, presenter, *more)
         presenter.attach(view)
         return cast(QWidget, view)
 
+    def _menu_button(self) -> QToolButton:
+        button = _make_rail_button(gettext("Menu"))
+        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonIconOnly)  # low, for low screens
+        button.setAccessibleName(button.text())
+        fill_menu(button, self, self.show_help)
+        bind_button(button, "F10", gettext("About, documentation, log"), self)
+        return button
+
     def _rail_button(self, screen: Screen) -> QToolButton:
-        button = QToolButton()
-        button.setProperty("role", "rail")
-        button.setText(gettext(screen.label))
-        button.setFont(font(TextRole.LABEL))
+        button = _make_rail_button(gettext(screen.label))
         button.setCheckable(True)
         button.setAutoExclusive(True)
-        button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
-        button.setIconSize(QSize(24, 24))
-        button.setFixedWidth(72)
-        button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
         button.clicked.connect(lambda: self._presenter.show_screen(screen))
         return button
 
@@ -186,21 +230,35 @@ class MainWindow(QMainWindow):
             bind_button(button, key, gettext(screen.label), self)
         add_shortcut(self, "Ctrl+O", gettext("Open a recording"), self.ask_for_run)
         add_shortcut(self, "F1", gettext("Show these keys"), self.show_help)
+        add_shortcut(self, "Ctrl+Q", gettext("Close the window and end the program"), self.close)
 
     def _restyle(self) -> None:
         tokens = self._theme.tokens
         for screen, button in self._rail.items():
             button.setIcon(icon(screen.icon, tokens.muted, active=tokens.accent))
+        self._menu.setIcon(icon("list", tokens.muted))
 
     def _lay_out(self) -> None:
         rail, middle = QFrame(), QWidget()
         rail.setProperty("role", "rail")
         at_top = [button for screen, button in self._rail.items() if screen not in _AT_FOOT]
         at_foot = [self._rail[screen] for screen in _AT_FOOT]
-        make_column(*at_top, STRETCH, *at_foot, spacing=4, margins=(8, 8), of=rail)
+        make_column(*at_top, STRETCH, *at_foot, self._menu, spacing=2, margins=(8, 8), of=rail)
         content = make_column(self._notice, (self._stack, 1))
         make_row(rail, (content, 1), of=middle)
         self.setCentralWidget(middle)
+
+
+def _make_rail_button(text: str) -> QToolButton:
+    button = QToolButton()
+    button.setProperty("role", "rail")
+    button.setText(text)
+    button.setFont(font(TextRole.LABEL))
+    button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextUnderIcon)
+    button.setIconSize(QSize(24, 24))
+    button.setFixedWidth(72)
+    button.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+    return button
 
 
 _WORDS = {"bad": N_("Error"), "warn": N_("Note"), "ok": N_("Done"), "plain": ""}

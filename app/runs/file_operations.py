@@ -1,4 +1,7 @@
-"""Move and copy run files without overwriting or deleting any: copies, trash, recovered runs."""
+"""Move and copy run files without overwriting any: copies, trash, recovered runs.
+
+Only runs in the trash are ever deleted.
+"""
 
 import contextlib
 import itertools
@@ -16,13 +19,13 @@ from app.runs.listing import check_folder_exists, find_run_files
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.metadata import EndMetadata
 from app.runs.metadata_io import read_end_metadata, read_identifier
+from app.runs.paths import TRASH
 from app.runs.reader import check_openable, read_file
 from app.runs.rewrite import editing_lock
 from app.runs.validator import Validator
 from config.durable_files import remove_file, replace_file
 from messages.i18n import N_
 
-TRASH = ".trash"
 ASIDE = ".before-recovery"
 """Appended to the name of a file that a recovered run replaced, where it holds anything of its own."""
 
@@ -54,7 +57,7 @@ def move_to_trash(path: Path) -> Path:
     path = path.absolute()
     if path.parent.name == TRASH:
         raise errors.UnsuitableRunError(
-            "{path} is in the trash already. Nothing is ever deleted by Slipstand", path=path
+            "{path} is in the trash already. Leave it there, or restore it", path=path
         )
     _check_movable(path)
     if path.is_symlink():
@@ -71,12 +74,18 @@ def move_to_trash(path: Path) -> Path:
 def restore_from_trash(path: Path) -> Path:
     """Move a run from the trash back to its folder. Returns the new path. Raises RunError."""
     path = path.absolute()
-    if path.parent.name != TRASH:
-        raise errors.UnsuitableRunError(
-            "{path} is not in a trash folder. Give a run in a folder named {trash}", path=path, trash=TRASH
-        )
-    _check_movable(path)
+    _check_trashed(path)
     return _move(path, path.parent.parent)
+
+
+def delete_from_trash(path: Path) -> None:
+    """Delete a run in the trash for ever. Raises RunError."""
+    path = path.absolute()
+    _check_trashed(path)
+    try:
+        path.unlink()
+    except OSError as error:
+        raise storage_error(path, error) from None
 
 
 def list_trash(folder: Path) -> list[Path]:
@@ -178,6 +187,14 @@ def _names_taken(folder: Path, path: Path) -> errors.RunExistsError:
     return errors.RunExistsError(
         "{folder}: all names like {name} are taken. Move some runs elsewhere", folder=folder, name=path.name
     )
+
+
+def _check_trashed(path: Path) -> None:
+    if path.parent.name != TRASH:
+        raise errors.UnsuitableRunError(
+            "{path} is not in a trash folder. Give a run in a folder named {trash}", path=path, trash=TRASH
+        )
+    _check_movable(path)
 
 
 def _check_movable(path: Path) -> None:

@@ -14,7 +14,7 @@ import platformdirs
 from app.runs.disk import atomic_write, make_folder
 from app.runs.errors import DamagedRunError, NotARunError, RunError, RunNotFoundError
 from app.runs.lock import RECORDING_SUFFIX
-from app.runs.paths import recordings_directory
+from app.runs.paths import TRASH, recordings_directory
 from app.runs.reader import check_openable
 from app.runs.schema import SUFFIX
 from app.runs.summary import RunSummary
@@ -90,17 +90,21 @@ class RunFilter(msgspec.Struct, frozen=True):
 
 
 def list_runs(
-    folder: Path | None = None, wanted: RunFilter | None = None, *, progress: Progress | None = None
+    folder: Path | None = None,
+    wanted: RunFilter | None = None,
+    *,
+    progress: Progress | None = None,
+    in_trash: bool = False,
 ) -> list[RunSummary]:
     """Summaries of all runs in a folder and those below it, oldest first, files with a fault last.
 
     `folder` is by default the recordings folder, which need not exist. `progress` is called with the numbers
-    of new files examined and of all. Raises RunNotFoundError.
+    of new files examined and of all. With `in_trash` the runs in their trashes. Raises RunNotFoundError.
     """
     if folder is not None:
         check_folder_exists(folder)
     folder = (folder or recordings_directory()).absolute()
-    found = _summaries(folder, progress or (lambda _done, _all: None))
+    found = _summaries(folder, progress or (lambda _done, _all: None), in_trash=in_trash)
     return sorted(filter(wanted.matches, found) if wanted else found, key=_order)
 
 
@@ -133,24 +137,32 @@ class _File(msgspec.Struct, frozen=True, gc=False):
     may_be_recorded: bool
 
 
-def _files(folder: Path) -> Iterator[_File]:
-    """Run files, each with its stamp, without opening any."""
+def _files(folder: Path, *, in_trash: bool = False) -> Iterator[_File]:
+    """Run files, each with its stamp, without opening any; with `in_trash` those in the trashes."""
     pending = [str(folder)]
     while pending:
-        try:
-            with os.scandir(pending.pop()) as listing:
-                entries = [entry for entry in listing if not entry.name.startswith(".")]
-        except OSError:  # gone or closed to this user meanwhile
-            continue
-        locked = {entry.name for entry in entries if entry.name.endswith(RECORDING_SUFFIX)}
-        for entry in entries:
-            if entry.name.endswith(SUFFIX) and _is_file(entry):
-                with contextlib.suppress(OSError):  # gone meanwhile
-                    stat = entry.stat()
-                    stamp = (stat.st_size, stat.st_mtime_ns)
-                    yield _File(entry.path, stamp, entry.name + RECORDING_SUFFIX in locked)
-            elif entry.is_dir(follow_symlinks=False):
-                pending.append(entry.path)
+        place = pending.pop()
+        entries = _entries(place)
+        pending += [entry.path for entry in entries if entry.is_dir(follow_symlinks=False)]
+        yield from _run_files(_entries(f"{place}{os.sep}{TRASH}") if in_trash else entries)
+
+
+def _entries(folder: str) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as listing:
+            return [entry for entry in listing if not entry.name.startswith(".")]
+    except OSError:  # gone or closed to this user meanwhile
+        return []
+
+
+def _run_files(entries: list[os.DirEntry[str]]) -> Iterator[_File]:
+    locked = {entry.name for entry in entries if entry.name.endswith(RECORDING_SUFFIX)}
+    for entry in entries:
+        if entry.name.endswith(SUFFIX) and _is_file(entry):
+            with contextlib.suppress(OSError):  # gone meanwhile
+                stat = entry.stat()
+                stamp = (stat.st_size, stat.st_mtime_ns)
+                yield _File(entry.path, stamp, entry.name + RECORDING_SUFFIX in locked)
 
 
 def _is_file(entry: os.DirEntry[str]) -> bool:
@@ -160,11 +172,12 @@ def _is_file(entry: os.DirEntry[str]) -> bool:
         return False
 
 
-def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
-    known = _load_index(folder)
+def _summaries(folder: Path, progress: Progress, *, in_trash: bool) -> list[RunSummary]:
+    indexed = folder / TRASH if in_trash else folder
+    known = _load_index(indexed)
     index: Index = {}
     changed: list[_File] = []
-    for file in _files(folder):
+    for file in _files(folder, in_trash=in_trash):
         entry = known.get(file.path)
         if entry is not None and entry[0] == file.stamp and not file.may_be_recorded:
             index[file.path] = entry
@@ -180,10 +193,10 @@ def _summaries(folder: Path, progress: Progress) -> list[RunSummary]:
             if lasts:
                 index[file.path] = (file.stamp, summary)
             if time.perf_counter() - saved_at > _SAVE_S:
-                _save_index(folder, index)
+                _save_index(indexed, index)
                 saved_at = time.perf_counter()
     if changed or len(index) != len(known):
-        _save_index(folder, index)
+        _save_index(indexed, index)
     return found
 
 

@@ -11,6 +11,7 @@ import config
 from config.files import is_checkout, load_settings
 from config.schema import Settings
 
+TRASH = ".trash"  # folder beside runs that holds those moved to the trash
 RECORDINGS = "SLIPSTAND_RECORDINGS"  # variable that says where runs are kept, before all settings
 
 

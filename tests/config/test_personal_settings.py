@@ -5,8 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from config.files import load_settings, load_window_layout, save_settings, save_window_layout
-from config.schema import ConfigError, Settings, WindowLayout
+from config.files import (
+    load_recent,
+    load_settings,
+    load_window_layout,
+    save_recent,
+    save_settings,
+    save_window_layout,
+)
+from config.schema import ConfigError, RecentDevice, RecentUse, Settings, WindowLayout
 
 DAY = datetime.date(2026, 1, 12)
 
@@ -31,6 +38,15 @@ def test_what_is_kept_comes_back() -> None:
     assert save_window_layout(place, DAY) is None
     assert load_settings() == chosen
     assert load_window_layout() == place
+
+
+@pytest.mark.parametrize("device", [None, RecentDevice("GSV-8", "COM7", "gsv", stop_bits="2")])
+def test_what_was_used_last_comes_back(device: RecentDevice | None) -> None:
+    assert load_recent() == RecentUse()
+    recent = RecentUse(device, ("/runs/ä.h5", "C:\\runs\\b.h5"), ("/runs",), "/tables", "/logger")
+    assert save_recent(RecentUse(runs=("/old.h5",)), DAY) is None
+    assert save_recent(recent, DAY) is None
+    assert load_recent() == recent
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import SeriesRow
 from analysis.campaign.series import RunResult
 from analysis.campaign.stand_effects import EffectScope, EffectSummary
-from analysis.catalogue import MILLIMETRE, Place, QuantityDefinition, TableColumn
+from analysis.catalogue import Place, QuantityDefinition, TableColumn
 from analysis.formatting import typeset, with_unit
 from analysis.motion.two_mass import TwoMassParameters
 from analysis.plan import plan
@@ -297,6 +297,6 @@ def _expectations(code: str, runs: CollectedRuns, campaign: Campaign, stand: Sta
         yield gettext("f<sub>d</sub> so far: {value}", value=so_far)
     if (friction := planned.results.get(_FRICTION)) is not None:
         yield gettext("f<sub>d</sub> by one test: {value}", value=_with_uncertainty(friction))
-    length = number_text.format_in(MILLIMETRE, abs(planned.motion.residual_displacement_m))
+    length = number_text.format_displacement(abs(planned.motion.residual_displacement_m))
     yield gettext("the plate ends {length} off: re-centre it afterwards", length=length)
     yield from (sentence(warning.message) for warning in planned.warnings)

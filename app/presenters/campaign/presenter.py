@@ -15,8 +15,10 @@ from app.presenters.campaign.state import (
     row_without_runs,
 )
 from app.presenters.navigator import Navigator
+from app.presenters.recent import RecentItems
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
+from config.schema import Stand
 from messages.i18n import gettext, ngettext
 
 if TYPE_CHECKING:
@@ -30,9 +32,17 @@ class CampaignPresenter(Presenter[CampaignState]):
     """Campaign of a folder: `author` is recorded with each exclusion, `close` ends the worker."""
 
     def __init__(
-        self, worker: Worker, folder: str, all_series: tuple[str, ...], author: str, navigator: Navigator
+        self,
+        worker: Worker,
+        folder: str,
+        all_series: tuple[str, ...],
+        author: str,
+        navigator: Navigator,
+        recent: RecentItems | None = None,
     ) -> None:
         self._worker = worker
+        self.recent = recent or RecentItems()
+        self._recordings = folder
         self._all_series = all_series
         self._author = author
         self.navigator = navigator
@@ -48,6 +58,10 @@ class CampaignPresenter(Presenter[CampaignState]):
     def refresh(self) -> None:
         self._collect(save=False)
 
+    def on_stand(self, stand: Stand) -> None:
+        self._all_series = stand.all_series
+        self._set_state(self._empty_state(self.state.folder))  # gathered anew when the screen is shown
+
     def set_author(self, name: str) -> None:
         self._author = name
 
@@ -60,7 +74,13 @@ class CampaignPresenter(Presenter[CampaignState]):
                 self._is_collecting = False
                 self.refresh()
 
+    @property
+    def recent_folders(self) -> tuple[str, ...]:
+        """Folders that were gathered last, and that of the recordings."""
+        return self.recent.folders_with(self._recordings)
+
     def choose_folder(self, folder: str) -> None:
+        self.recent.add_folder(folder)
         self._worker.cancel()
         self._undos, self._is_collecting = [], False
         self._set_state(self._empty_state(folder))
@@ -84,7 +104,7 @@ class CampaignPresenter(Presenter[CampaignState]):
             self._exclude(path, reason.strip())
         else:
             text = gettext("Say why the run is left out: the reason stands in the table")
-            self._update(message=Chip(text, Tone.WARN))
+            self._set_message(Chip(text, Tone.WARN))
 
     def include_run(self, path: str) -> None:
         self._exclude(path, "")
@@ -100,6 +120,7 @@ class CampaignPresenter(Presenter[CampaignState]):
 
     def export(self, product: Product, target: str) -> None:
         if self.state.summary.run_count:
+            self.recent.set_export_target(target)
             self._submit(products.write_product, self._scope(), product, target, done=self._on_written)
 
     def simulate_campaign(self) -> None:
@@ -157,24 +178,27 @@ class CampaignPresenter(Presenter[CampaignState]):
         self._is_collecting = False
         self._update(progress=None)
         if not failure.is_cancelled:
-            self._update(message=Chip(sentence(failure.message), Tone.BAD))
+            self._set_message(Chip(sentence(failure.message), Tone.BAD))
 
     def _on_collected(self, saved: bool, summary: CampaignSummary) -> None:
         self._is_collecting = False
         self._on_summary(summary)
         if saved:
-            self._update(message=Chip(gettext("New results are kept in their runs"), Tone.OK))
+            self._set_message(Chip(gettext("New results are kept in their runs"), Tone.OK))
 
     def _on_excluded(self, path: str, reason: str, summary: CampaignSummary) -> None:
         self._undos.append((gettext("leaving out") if reason else gettext("taking in"), path))
         self._on_summary(summary)
         name = Path(path).stem
         text = gettext("{run} is left out", run=name) if reason else gettext("{run} counts again", run=name)
-        self._update(message=Chip(text, Tone.OK))
+        self._set_message(Chip(text, Tone.OK))
 
     def _on_written(self, files: tuple[str, ...]) -> None:
         text = ngettext("Wrote {first}", "Wrote {count} files: {first} …", len(files), first=files[0])
-        self._update(message=Chip(text, Tone.OK))
+        self._set_message(Chip(text, Tone.OK), written_to=str(Path(files[0]).parent))
+
+    def _set_message(self, message: Chip, *, written_to: str = "") -> None:
+        self._update(message=message, written_to=written_to)
 
     def _on_summary(self, summary: CampaignSummary) -> None:
         has_selected = any(row.label == self.state.selected and row.runs for row in summary.rows)
@@ -183,5 +207,6 @@ class CampaignPresenter(Presenter[CampaignState]):
             selected=self.state.selected if has_selected else "",
             undo_text=self._undos[-1][0] if self._undos else "",
             message=EMPTY_CHIP,
+            written_to="",
             is_gathered=True,
         )

@@ -171,6 +171,8 @@ class CampaignState:
     selected: str = ""  # label of the row whose runs are listed
     undo_text: str = ""  # change that undo would undo; empty without one
     message: Chip = EMPTY_CHIP
+    written_to: str = ""
+    """Folder of the product that `message` is about; empty where it is about something else."""
     progress: Progress | None = None
     is_gathered: bool = False
 

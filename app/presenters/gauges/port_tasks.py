@@ -82,6 +82,7 @@ def probed_port(report: PortReport) -> PortCard:
             *hints,
         ),
         suggested_form=suggested_form(report, found),
+        needs_second=found.channels == 1,
     )
 
 

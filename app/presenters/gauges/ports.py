@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.gauges.state import PortCard, PortsState
-from app.presenters.navigator import Navigator
+from app.presenters.navigator import ConnectForm, Navigator
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
 from messages.i18n import gettext
@@ -51,10 +51,17 @@ class PortsPresenter(Presenter[PortsState]):
         if self._is_probing:
             self._worker.cancel()
 
+    def connect(self, url: str) -> None:
+        """Connect to the device that was found on a port."""
+        form = self._suggested_form(url)
+        if form is not None:
+            self.cancel()
+            self._navigator.connect_device(form)
+
     def fill_port(self, url: str) -> None:
-        for card in self.state.ports:
-            if card.url == url and card.suggested_form is not None:
-                self._navigator.fill_connection(card.suggested_form)
+        form = self._suggested_form(url)
+        if form is not None:
+            self._navigator.fill_connection(form)
 
     def fill_second_port(self, url: str) -> None:
         self._navigator.fill_second_port(url)
@@ -64,6 +71,9 @@ class PortsPresenter(Presenter[PortsState]):
 
     def close(self) -> None:
         self._worker.close()
+
+    def _suggested_form(self, url: str) -> ConnectForm | None:
+        return next((card.suggested_form for card in self.state.ports if card.url == url), None)
 
     def _on_progress(self, progress: Progress) -> None:
         self._update(progress=progress.text)

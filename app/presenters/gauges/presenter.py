@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TYPE_CHECKING, Final
 
-from analysis.catalogue import MICROMETRE, MILLIMETRE
+from analysis.catalogue import MICROMETRE, displacement_unit
 from analysis.formatting import format_signed, typeset, with_unit
 from app.acquisition.averaged_counts import WINDOW_S, RecentSamples
 from app.acquisition.messages import Connected
@@ -17,7 +17,7 @@ from app.presenters.gauges.check import CheckPresenter
 from app.presenters.gauges.ports import PortsPresenter
 from app.presenters.gauges.state import NAMES, ActiveCalibrations, GaugeCard, GaugesState, GaugesTab
 from app.presenters.navigator import Navigator
-from app.presenters.number_text import format_in
+from app.presenters.number_text import format_displacement, format_in
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
 from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
@@ -212,7 +212,7 @@ def _last_check_chip(check: GaugeCheck | None) -> Chip:
         "{time}: {off} at {known}, {allowed} allowed",
         time=f"{check.at:%Y-%m-%d %H:%M}",
         off=with_unit(off, MICROMETRE.symbol),
-        known=format_in(MILLIMETRE, check.expected_m, 3),
+        known=format_displacement(check.expected_m, 3),
         allowed=format_in(MICROMETRE, check.tolerance_m, 0),
     )
     by = f"{reference_kind}. {check.reference} {check.checked_by}".strip()
@@ -225,6 +225,11 @@ def _last_check_chip(check: GaugeCheck | None) -> Chip:
     )
 
 
+def _range_text(range_m: float) -> str:
+    unit = displacement_unit()
+    return with_unit(f"± {unit.scale * range_m:.6g}", unit.symbol)
+
+
 def _values(gauge: Gauge) -> Iterator[LabelledValue]:
     relative, range_m = gauge.gain_relative_standard_uncertainty, gauge.range_m
     polynomial = ", ".join(typeset(f"{term:.3g}") for term in gauge.polynomial)
@@ -235,7 +240,7 @@ def _values(gauge: Gauge) -> Iterator[LabelledValue]:
         gettext("gain uncertainty"): "" if relative is None else with_unit(f"{100 * relative:.2f}", "%"),
         gettext("zero"): with_unit(typeset(f"{gauge.zero_count:.9g}"), "counts"),
         **({gettext("polynomial"): polynomial} if polynomial else {}),
-        gettext("range"): "" if range_m is None else with_unit(f"± {1e3 * range_m:g}", MILLIMETRE.symbol),
+        gettext("range"): "" if range_m is None else _range_text(range_m),
         **({gettext("non-linearity"): linearity} if linearity else {}),
         gettext("filter"): translate(gauge.filter.description) if gauge.filter else "",
         gettext("calibrated"): gauge.date.isoformat() if gauge.date else "",

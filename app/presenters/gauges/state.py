@@ -77,6 +77,8 @@ class PortCard:
     """The device that was recognised, or why none was; empty before the port is probed."""
     description: tuple[str, ...] = ()  # how the device was verified, problems and remedies
     suggested_form: ConnectForm | None = None  # form of the Start screen that connects to the device
+    needs_second: bool = False
+    """The device reads one gauge: the form lacks the port of gauge 2."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from typing import Final, Literal
 from analysis.calibration.calibrate import Calibration, DialGauge, calibrate
 from analysis.calibration.known_displacement import DisplacementCheck
 from analysis.calibration.points import CalibrationPoints
-from analysis.catalogue import MICROMETRE, MILLIMETRE
+from analysis.catalogue import MICROMETRE
 from analysis.formatting import typeset, with_unit
 from analysis.gauge_health import measure_health
 from app.acquisition import gauge_check
@@ -29,7 +29,7 @@ from app.presenters.gauges.state import (
     CheckKind,
     CheckOutcome,
 )
-from app.presenters.number_text import format_in
+from app.presenters.number_text import format_displacement, format_in
 from app.runs.calibration_points import CalibrationDetails, calibrated_gauge, write_points
 from config import files
 from config.files import load_checks, load_gauges, settings_file
@@ -161,7 +161,7 @@ def _check_values(found: DisplacementCheck) -> Iterator[LabelledValue]:
         (gettext("off by"), found.deviation_m),
         (gettext("allowed, twice the standard uncertainty"), found.tolerance_m),
     ):
-        yield LabelledValue(words, format_in(MILLIMETRE, value_m, 4))
+        yield LabelledValue(words, format_displacement(value_m, 4))
     for line in found.budget:
         value = line.standard_uncertainty
         yield LabelledValue(

@@ -11,7 +11,8 @@ from analysis.catalogue import (
     MILLIMETRE,
     MILLIMETRES_PER_SECOND,
     Unit,
-    reading_units,
+    displacement_unit,
+    reading_units_on_screen,
 )
 from analysis.formatting import format_value, typeset, with_unit
 from analysis.plate.trends import FrictionTrend
@@ -53,7 +54,7 @@ def time_span(run: AnalysedRun) -> tuple[float, float]:
 def curves(run: AnalysedRun) -> Curves:
     """Record, simulation and residual."""
     origin_s = time_origin_s(run)
-    unit, residual_unit = reading_units(run.unit)
+    unit, residual_unit = reading_units_on_screen(run.unit)
     channels = [channel for channel in (run.table, run.relative) if channel is not None]
     return Curves(
         time_s=run.time_s - origin_s,
@@ -96,7 +97,7 @@ def motion(run: AnalysedRun) -> Motion | None:
         return PlottedQuantity(symbol, unit.symbol, _DECIMALS[unit], time_s, unit.scale * values)
 
     velocity = line(f"{_TABLE}′", MILLIMETRES_PER_SECOND, found.table_m_per_s)
-    relative = line(_RELATIVE, MILLIMETRE, found.relative_m)
+    relative = line(_RELATIVE, displacement_unit(), found.relative_m)
     sliding = found.plate_m_per_s - found.table_m_per_s
     relative_velocity = line(f"{_PLATE}′ − {_TABLE}′", MILLIMETRES_PER_SECOND, sliding)
     return {
@@ -113,7 +114,12 @@ def motion(run: AnalysedRun) -> Motion | None:
             line(f"{_PLATE}″ − {_TABLE}″", ACCELERATION, found.plate_m_per_s2 - found.table_m_per_s2),
             relative,
         ),
-        PlotTab.PHASE: (line(_TABLE, MILLIMETRE, found.table_m), velocity, relative, relative_velocity),
+        PlotTab.PHASE: (
+            line(_TABLE, displacement_unit(), found.table_m),
+            velocity,
+            relative,
+            relative_velocity,
+        ),
     }
 
 
@@ -122,10 +128,17 @@ def slip_plots(run: AnalysedRun) -> SlipPlots | None:
     found = run.friction_by_slip
     if found is None:
         return None
+    length = displacement_unit()
     return SlipPlots(
         (
             _slip_plot(found.with_velocity, gettext("sliding velocity, mm/s"), 1e3, "100 mm/s", 0.1),
-            _slip_plot(found.with_position, gettext("position on the table, mm"), 1e3, "mm", 1e-3),
+            _slip_plot(
+                found.with_position,
+                gettext("position on the table, {unit}", unit=length.symbol),
+                length.scale,
+                "mm",
+                1e-3,
+            ),
             _slip_plot(found.with_time, gettext("time from release, s"), 1.0, "s", 1.0),
         ),
         results.sentence(found.statement),

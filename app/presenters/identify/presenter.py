@@ -11,6 +11,7 @@ from app.presenters.analysed_run import AUTO_MODEL, AnalysedRun, AnalysisTask
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
 from app.presenters.identify import cursors as cursor_values
 from app.presenters.identify import plot_data, result_tables
+from app.presenters.identify.report import ReportPresenter
 from app.presenters.identify.state import (
     ClassicalRow,
     Cursor,
@@ -49,11 +50,15 @@ class _Shown:
 
 
 class IdentifyPresenter(Presenter[IdentifyState]):
-    """Shows one run; `worker` has it loaded, and is shared and closed by the window."""
+    """Shows one run; `worker` has it loaded, and is shared and closed by the window.
 
-    def __init__(self, worker: Worker) -> None:
+    `close` closes that of the `report`.
+    """
+
+    def __init__(self, worker: Worker, report: ReportPresenter) -> None:
         super().__init__(IdentifyState())
         self._worker = worker
+        self.report = report
         self._path = ""
         self._shown: _Shown | None = None
         self._span: tuple[float, float, int] | None = None
@@ -62,6 +67,7 @@ class IdentifyPresenter(Presenter[IdentifyState]):
 
     def on_opening(self, path: str) -> None:
         self._path = path
+        self.report.set_run("")
         self._shown = self._pending = self._next_friction = self._span = None
         self.state = IdentifyState(tab=self.state.tab)
         self._update(title=Path(path).name, progress=Progress(gettext("Reading the run")))
@@ -80,7 +86,14 @@ class IdentifyPresenter(Presenter[IdentifyState]):
 
     def on_analysed(self, run: AnalysedRun, true_friction: float | None = None) -> None:
         if str(run.path) == self._path:
+            self.report.set_run(self._path)
             self._show(_Shown(run, run, AnalysisTask(self._path, kind=run.kind), true_friction))
+
+    def tick(self) -> None:
+        self.report.tick()
+
+    def close(self) -> None:
+        self.report.close()
 
     def cancel(self) -> None:
         if self.state.progress is not None:

@@ -89,7 +89,7 @@ class ManualFit:
     """Simulation with f_d set by hand: lines of the table, then of gauge 2 if there is one."""
 
     friction: float
-    simulations_mm: tuple[PlotLine, ...]
+    simulations: tuple[PlotLine, ...]
     residuals_um: tuple[PlotLine, ...]
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from analysis.catalogue import displacement_unit
 from analysis.classical_estimates import estimate_classically
 from app.presenters.analysed_run import AnalysisTask
 from app.presenters.analysis_task import cached_analysis
@@ -25,10 +26,11 @@ def simulate_friction(task: AnalysisTask, friction: float, span: Span) -> Manual
     if record.relative_displacement_m is not None and shown.relative_displacement_m is not None:
         pairs.append((record.relative_displacement_m[rows], shown.relative_displacement_m))
     time_s = time_s - span.origin_s
+    scale = displacement_unit().scale
     every = max(1, len(time_s) // (2 * span.pixels))
     return ManualFit(
         friction,
-        tuple(PlotLine(time_s[::every], 1e3 * simulated[::every]) for _, simulated in pairs),
+        tuple(PlotLine(time_s[::every], scale * simulated[::every]) for _, simulated in pairs),
         tuple(_envelope(time_s, 1e6 * (read - simulated), span.pixels) for read, simulated in pairs),
     )
 

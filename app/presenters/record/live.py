@@ -8,8 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.catalogue import MILLIMETRE
-from analysis.formatting import THIN_SPACE, typeset, with_unit
+from analysis.formatting import THIN_SPACE, with_unit
 from app.acquisition.messages import Health, LiveResult, PullbackState, StandPosition, is_known
 from app.acquisition.pullback.plan import AllowedPlateRange
 from app.acquisition.ring import RingRows
@@ -177,7 +176,9 @@ class LiveTraces:
         return replace(self, tare_m=zero_m, zero_m=zero_m)._read(self.read_s)
 
     def _read(self, at_s: float) -> "LiveTraces":
-        table, relative = (typeset(MILLIMETRE.number(m, 2)) for m in self.newest_m() - self.zero_m)
+        table, relative = (
+            number_text.displacement_number(m, 2) for m in (self.newest_m() - self.zero_m).tolist()
+        )
         readings = LiveReadings(table, relative, self._origin(), self.stopped_at)
         return replace(self, read_s=at_s, readings=readings)
 
@@ -298,7 +299,7 @@ def _step_up(wanted: float, steps: Iterable[float]) -> float:
 def tare_chip(live: LiveTraces | None) -> Chip:
     if live is None:
         return Chip(gettext("The stand moves: tare when it is at rest"), Tone.WARN)
-    by = gettext(" and ").join(number_text.format_in(MILLIMETRE, m, 2) for m in live.tare_m.tolist())
+    by = gettext(" and ").join(number_text.format_displacement(m, 2) for m in live.tare_m.tolist())
     hint = gettext("The calibration and what is stored stay as they are")
     return Chip(gettext("Tared by {by}", by=by), Tone.OK, hint)
 
@@ -399,7 +400,7 @@ class GaugeMonitor:
         value_m = (rows.table_m, rows.relative_m)[self.channel][-1]
         range_m, until = self.gauge.range_m, self.gauge.valid_until
         if range_m is not None and abs(value_m) > _NEAR_LIMIT * range_m:
-            at = number_text.format_in(MILLIMETRE, value_m)
+            at = number_text.format_displacement(float(value_m))
             hint = gettext("It stands at {at}.", at=at)
             return Chip(gettext("{name} at its limit", name=self.name), Tone.WARN, hint)
         if until is not None and until < today:

@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -45,6 +45,8 @@ class NextRuns:
     is_requested: bool = False
     is_loaded: bool = False
     """The stored plan was requested; was read."""
+    plans_before: tuple[Plan, ...] = ()
+    """Plans that undo brings back, the last one at the end."""
     is_edited: bool = False  # the operator has changed form or plan before the stored ones were read
     completed: CompletedRuns = ()
     undecided_path: str = ""
@@ -68,6 +70,11 @@ class NextRuns:
     def with_choices(self, **changes: Any) -> "NextRuns":
         choices = replace(self.choices, **changes)
         return replace(self, choices=replace(choices, summary=form_summary(choices.form)))
+
+    def with_all_series(self, all_series: tuple[str, ...]) -> "NextRuns":
+        """Offer other series; the chosen one stays while it is among them. The plan stays as it is."""
+        series = self.series if self.series in all_series else all_series[0]
+        return self.with_choices(all_series=all_series, series=series)
 
     def with_form(self, form: RunForm) -> "NextRuns":
         """Take an edited form; its error is in `choices.form_error`."""
@@ -97,8 +104,14 @@ class NextRuns:
             plan = parse_plan(text, self.choices.all_series)
         except PlanError as error:
             return replace(self, plan=replace(self.plan, text=text, error=sentence(error.message)))
-        changed = replace(self, is_edited=True, tests=self.tests.replace(plan=plan))
-        return changed._counted().with_next_series()
+        before = self.plans_before if plan == self.tests.plan else (*self.plans_before, self.tests.plan)
+        return self._with_plan(plan, before)
+
+    def with_plan_undone(self) -> "NextRuns":
+        """Take back the last change of the plan."""
+        if not self.plans_before:
+            return self
+        return self._with_plan(self.plans_before[-1], self.plans_before[:-1])
 
     def with_loaded_plan(self, loaded: LoadedPlan) -> "NextRuns":
         """Take what is stored in the folder; what was edited before stays."""
@@ -180,19 +193,23 @@ class NextRuns:
         text = gettext("{series} is full: arm again for {next}", series=series, next=self.series)
         return Chip(text, Tone.WARN)
 
+    def _with_plan(self, plan: Plan, before: tuple[Plan, ...]) -> "NextRuns":
+        tests = self.tests.replace(plan=plan)
+        changed = replace(self, is_edited=True, tests=tests, plans_before=before)
+        return changed._counted().with_next_series()
+
     def _counts(self) -> Counter[str]:
         return Counter(series for path, series in self.completed if path != self.undecided_path)
 
     def _counted(self) -> "NextRuns":
         plan = self.tests.plan
-        return replace(
-            self,
-            plan=PlanState(
-                plan_progress(plan, self._counts()),
-                format_plan(plan),
-                counts_simulated=self.counts_simulated,
-            ),
+        shown = PlanState(
+            plan_progress(plan, self._counts()),
+            format_plan(plan),
+            can_undo=bool(self.plans_before),
+            counts_simulated=self.counts_simulated,
         )
+        return replace(self, plan=shown)
 
 
 class PlanError(MessageError, ValueError):
@@ -228,6 +245,38 @@ def parse_plan(text: str, all_series: Sequence[str]) -> Plan:
 
 def format_plan(plan: Plan) -> str:
     return ", ".join(f"{one.series} x{one.repeats}" for one in plan)
+
+
+def plan_with_repeats(progress: Sequence[SeriesProgress], row: int, repeats: str) -> str:
+    """Text of a plan with other repeats of a series, as typed."""
+    parts = _parts(progress)
+    parts[row] = f"{progress[row].series} x{repeats.strip()}"
+    return _joined(parts)
+
+
+def plan_with_added(progress: Sequence[SeriesProgress], text: str) -> str:
+    """Text of a plan with the series of `text`, as typed, behind the others."""
+    return _joined([*_parts(progress), text.strip()])
+
+
+def plan_with_moved(progress: Sequence[SeriesProgress], row: int, by: int) -> str:
+    """Text of a plan with a series moved by some rows."""
+    parts = _parts(progress)
+    parts.insert(row + by, parts.pop(row))
+    return _joined(parts)
+
+
+def plan_without(progress: Sequence[SeriesProgress], rows: Collection[int]) -> str:
+    """Text of a plan without the series of some rows."""
+    return _joined([part for row, part in enumerate(_parts(progress)) if row not in rows])
+
+
+def _parts(progress: Sequence[SeriesProgress]) -> list[str]:
+    return [f"{one.series} x{one.planned}" for one in progress]
+
+
+def _joined(parts: Sequence[str]) -> str:
+    return ", ".join(filter(None, parts))
 
 
 def plan_progress(plan: Plan, completed: Mapping[str, int]) -> tuple[SeriesProgress, ...]:

@@ -17,7 +17,7 @@ from app.presenters.record.reducer import Effect, reduce
 from app.presenters.record.state import Action, Cue, TaskDone, TaskFailed
 from app.presenters.results import sentence
 from app.presenters.worker import LazyModule, Worker
-from config.schema import Gauges
+from config.schema import Gauges, Stand
 from messages.i18n import N_, gettext, translate
 
 if TYPE_CHECKING:
@@ -130,6 +130,9 @@ class RecordPresenter(Presenter[state.RecordState]):
     def on_gauges(self, gauges: Gauges) -> None:
         self.dispatch(gauges)
 
+    def on_stand(self, stand: Stand) -> None:
+        self.dispatch(stand)
+
     def close(self) -> None:
         """Wait until decisions are stored, then end the worker."""
         until_s = time.perf_counter() + self.CLOSE_S
@@ -179,7 +182,28 @@ def record_state(model: RecordModel) -> state.RecordState:
         primary=primary if primary in allowed and not (ended and ended.is_awaited) else None,
         disarms=session.disarms,
         connected=session.engine is not None,
+        title=_title(model),
     )
+
+
+def _title(model: RecordModel) -> tuple[str, ...]:
+    session, run = model.session, model.ended.run if model.ended else model.session.run
+    name = run.name if model.is_run_shown else ""
+    if session.engine is None:
+        state_text = ""
+    elif session.loss_reason:
+        state_text = gettext("device lost")
+    elif session.engine is PullbackState.CONNECTING:
+        state_text = gettext("connecting")
+    elif session.is_idle:
+        state_text = gettext("ready")
+    else:
+        state_text = gettext("recording: {step}", step=_step_name(session.engine))
+    return tuple(filter(None, (name, session.device, state_text)))
+
+
+def _step_name(engine: PullbackState) -> str:
+    return next((gettext(name) for name, states, _ in _STEPS if engine in states), "")
 
 
 def _guidance(model: RecordModel) -> state.GuidanceState:

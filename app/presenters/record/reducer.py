@@ -25,7 +25,7 @@ from app.presenters.record.model import (
 from app.presenters.record.next_runs import NextRuns
 from app.presenters.record.state import Action, AnalysisFailed, AnalysisProgress, TaskDone, TaskFailed
 from app.presenters.results import Result, sentence
-from config.schema import Gauges, Settings
+from config.schema import Gauges, Settings, Stand
 from messages.i18n import gettext, ngettext
 from messages.message import Message
 
@@ -64,6 +64,8 @@ class _Reduction:
                 self._on_clock(now_s)
             case Action():
                 self._on_action(event)
+            case state.Notification.SCREEN_ENTERED if model.next_runs.is_loaded:
+                self._count_completed()  # runs may have been moved or brought back on Runs
             case state.Notification.SCREEN_ENTERED:
                 self._load_plan()
             case state.SeriesChosen(series):
@@ -107,6 +109,9 @@ class _Reduction:
                 self._on_settings(event)
             case Gauges():
                 self._set(stand=replace(model.stand, gauges=event), monitors=monitors_of(event))
+            case Stand():
+                stand = replace(model.stand, stand=event, all_series=event.all_series)
+                self._set(stand=stand, next_runs=model.next_runs.with_all_series(event.all_series))
             case state.Notification.RUNS_CHANGED:
                 self._count_completed()
             case _:
@@ -126,6 +131,8 @@ class _Reduction:
         match action:
             case Action.UNDO if model.undo_text:
                 self._undo()
+            case Action.UNDO_PLAN:
+                self._save(model.next_runs.with_plan_undone())
             case Action.UNTARE if Action.TARE in model.allowed:
                 self._set(live=model.live.untared())
                 self._forget_last()

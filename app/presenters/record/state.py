@@ -12,7 +12,7 @@ from app.presenters.decimated_history import Polyline
 from app.presenters.device_status import DeviceStatus
 from app.presenters.results import Result, ResultRow
 from app.runs.next_tests import NextTests
-from config.schema import Gauges, Settings
+from config.schema import Gauges, Settings, Stand
 from messages.i18n import N_, gettext
 from messages.message import Message
 
@@ -191,6 +191,7 @@ class PlanState:
     text: str = ""
     error: str = ""
     counts_simulated: bool = False  # whether simulated runs are among those that are done
+    can_undo: bool = False
 
     @property
     def planned(self) -> int:
@@ -213,6 +214,7 @@ class Action(StrEnum):
     REPEAT = "repeat"  # move the run to the trash and record the same series again
     DISCARD = "discard"
     UNDO = "undo"
+    UNDO_PLAN = "undo-plan"  # take the last change of the plan back
 
 
 class Cue(StrEnum):
@@ -248,6 +250,8 @@ class RecordState:
     disarms: bool = False
     """`Action.STOP` keeps no run, since the table has not been pulled back."""
     connected: bool = False
+    title: tuple[str, ...] = ()
+    """Run, device and state of the recording, as far as there are any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -397,10 +401,11 @@ RecordEvent = (
     | AnalysedRun
     | Settings
     | Gauges
+    | Stand
     | TaskDone
     | TaskFailed
     | AnalysisProgress
     | AnalysisFailed
     | Event
 )
-"""Settings, calibrations, an edited form, an identified run and new samples are events by themselves."""
+"""Settings, calibrations, the stand, an edited form, an analysed run and samples are events by themselves."""

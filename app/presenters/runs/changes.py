@@ -1,7 +1,7 @@
 """Changes of runs that the Runs screen offers: tasks, messages, and how they are undone."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -63,15 +63,39 @@ def trash(paths: Paths) -> Change:
         (),
         gettext("Moving to the trash"),
         lambda runs: gettext("Moved {runs} to the trash", runs=runs),
-        lambda done: Change(
-            done,
-            file_operations.restore_from_trash,
-            (),
-            gettext("Bringing back"),
-            lambda runs: gettext("Brought back {runs}", runs=runs),
-            undone_text=gettext("move of {runs} to the trash", runs=run_count_text(done)),
+        lambda done: _undoing(
+            restore(done), gettext("move of {runs} to the trash", runs=run_count_text(done))
         ),
     )
+
+
+def restore(paths: Paths) -> Change:
+    return Change(
+        paths,
+        file_operations.restore_from_trash,
+        (),
+        gettext("Bringing back"),
+        lambda runs: gettext("Brought back {runs}", runs=runs),
+        lambda done: _undoing(
+            trash(done), gettext("return of {runs} from the trash", runs=run_count_text(done))
+        ),
+    )
+
+
+def delete(paths: Paths) -> Change:
+    """Deletion of trashed runs for ever."""
+    return Change(
+        paths,
+        file_operations.delete_from_trash,
+        (),
+        gettext("Deleting"),
+        lambda runs: gettext("Deleted {runs}", runs=runs),
+    )
+
+
+def _undoing(change: Change, undone_text: str) -> Change:
+    """Make a change one that undoes another, and is not undone itself."""
+    return replace(change, undo=None, undone_text=undone_text)
 
 
 def copy(paths: Paths, folder: str) -> Change:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone
+from app.presenters.recent import RecentItems
 from app.presenters.results import sentence
 from app.presenters.runs.state import BatchOutcome
 from app.presenters.worker import LazyModule, Worker
@@ -53,21 +54,25 @@ class ExportState:
     progress: Progress | None = None
     message: Chip = EMPTY_CHIP
     details: tuple[str, ...] = ()
+    written_to: str = ""
+    """Folder of the files of the last export; empty before."""
 
 
 class ExportPresenter(Presenter[ExportState]):
     """Exports runs by `worker`, which the Runs screen polls and closes."""
 
-    def __init__(self, worker: Worker) -> None:
+    def __init__(self, worker: Worker, recent: RecentItems | None = None) -> None:
         super().__init__(ExportState())
         self._worker = worker
+        self._recent = recent or RecentItems()
         self._folder = Path()
         self._is_output_typed = False
 
     def open(self, runs: tuple[str, ...], folder: str) -> None:
-        self._folder = Path(folder)
+        """Export `runs`, to the folder of the last export, else to `folder`."""
+        self._folder = Path(self._recent.export_folder or folder)
         self._is_output_typed = False
-        self._update(runs=runs, message=EMPTY_CHIP, details=(), progress=None)
+        self._update(runs=runs, message=EMPTY_CHIP, details=(), progress=None, written_to="")
         self._propose()
 
     def set_format(self, name: str) -> None:
@@ -95,7 +100,9 @@ class ExportPresenter(Presenter[ExportState]):
             missing = N_("Choose the folder to write") if state.is_folder else N_("Choose the file to write")
             self._update(message=Chip(gettext(missing), Tone.BAD))
         elif state.progress is None:
-            self._update(progress=Progress(gettext("Exporting")), message=EMPTY_CHIP, details=())
+            self._update(
+                progress=Progress(gettext("Exporting")), message=EMPTY_CHIP, details=(), written_to=""
+            )
             self._worker.submit(
                 tasks.export_files,
                 state.runs,
@@ -113,12 +120,15 @@ class ExportPresenter(Presenter[ExportState]):
 
     def _on_done(self, outcome: BatchOutcome) -> None:
         files = tuple(dict.fromkeys(outcome.done))
+        if files:
+            self._recent.set_export_target(self.state.output)
         text = gettext("Wrote {files}", files=_files(files)) if files else gettext("Nothing was written")
         if outcome.faults:
             failed, all_runs = len(outcome.faults), len(self.state.runs)
             text += gettext("; {failed} of {all} runs could not be exported", failed=failed, all=all_runs)
         tone = Tone.BAD if outcome.faults else Tone.OK
-        self._update(progress=None, message=Chip(text, tone), details=outcome.faults)
+        folder = str(Path(files[0]).parent) if files else ""
+        self._update(progress=None, message=Chip(text, tone), details=outcome.faults, written_to=folder)
 
     def _on_failed(self, failure: TaskFailure) -> None:
         words = sentence(replace_options(failure.message, _LABELS))

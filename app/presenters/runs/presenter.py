@@ -3,18 +3,29 @@
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Progress, TaskFailure, Tone, run_count_text
+from app.presenters.recent import RecentItems
 from app.presenters.results import sentence
 from app.presenters.runs import changes
 from app.presenters.runs.analysis_queue import AnalysisQueue
 from app.presenters.runs.changes import Change
 from app.presenters.runs.export_presenter import ExportPresenter
 from app.presenters.runs.import_presenter import ImportPresenter
-from app.presenters.runs.state import BatchOutcome, Column, Overlay, RunFilter, RunsState, Span, Trace
+from app.presenters.runs.state import (
+    BatchOutcome,
+    Column,
+    MetadataForm,
+    Overlay,
+    RunFilter,
+    RunsState,
+    Span,
+    Trace,
+)
 from app.presenters.runs.table import RunList
 from app.presenters.worker import LazyModule, Worker
+from config.schema import Stand
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
@@ -37,9 +48,12 @@ class RunsPresenter(Presenter[RunsState]):
         all_series: tuple[str, ...],
         author: str,
         open_run: Callable[[str], None],
+        recent: RecentItems | None = None,
     ) -> None:
         super().__init__(RunsState(folder=folder, all_series=all_series))
-        self.export_dialog = ExportPresenter(worker)
+        self.recent = recent or RecentItems()
+        self._recordings = folder
+        self.export_dialog = ExportPresenter(worker, self.recent)
         self.import_dialog = ImportPresenter(worker, self._on_imported)
         self._worker = worker
         self._analysis_worker = analysis_worker
@@ -61,24 +75,35 @@ class RunsPresenter(Presenter[RunsState]):
     def refresh(self) -> None:
         if not self._is_listing:
             self._is_listing = True
+            place = self.state.folder, self.state.in_trash
             self._worker.submit(
                 tasks.list_folder,
-                self.state.folder,
-                done=self._on_listed,
+                *place,
+                done=partial(self._on_listed, place),
                 failed=self._on_listing_failed,
                 progress=self._set_progress,
             )
 
+    def on_stand(self, stand: Stand) -> None:
+        self._update(all_series=stand.all_series)
+
     def set_author(self, name: str) -> None:
         self._author = name
 
+    @property
+    def recent_folders(self) -> tuple[str, ...]:
+        """Folders that were shown last, and that of the recordings."""
+        return self.recent.folders_with(self._recordings)
+
     def choose_folder(self, folder: str) -> None:
+        self.recent.add_folder(folder)
         self._undos.clear()
-        self._update(
-            folder=folder, rows=(), total=0, is_listed=False, selected=(), metadata=None, overlay=None,
-            undo_text="", message=EMPTY_CHIP, details=(),
-        )  # fmt: skip
-        self.refresh()
+        self._show_place(folder=folder, in_trash=False, undo_text="")
+
+    def show_trash(self, shown: bool) -> None:
+        """Show the runs in the trash of the folder, or those of the folder again."""
+        if shown is not self.state.in_trash:
+            self._show_place(in_trash=shown)
 
     def set_filter(self, run_filter: RunFilter) -> None:
         self._update(filter=run_filter)
@@ -94,7 +119,7 @@ class RunsPresenter(Presenter[RunsState]):
         if paths == self.state.selected:
             return
         self._coarse = None
-        self._update(selected=paths, metadata=self._library.metadata(paths))
+        self._update(selected=paths, metadata=self._metadata(paths))
         readable = self._library.readable(paths)
         if readable:
             self._worker.submit(
@@ -126,7 +151,7 @@ class RunsPresenter(Presenter[RunsState]):
     def edit(self, field: str, text: str) -> None:
         """Set a field in all selected runs; an invalid text changes nothing."""
         before = self.state.metadata
-        paths = self._readable()
+        paths = self._editable()
         if before is None or not paths or (text == before.texts[field] and field not in before.mixed):
             return
         try:
@@ -144,18 +169,29 @@ class RunsPresenter(Presenter[RunsState]):
 
     def trash(self) -> None:
         """Move the selected runs to the trash; nothing is deleted."""
-        if self.state.selected:
+        if self.state.selected and not self.state.in_trash:
             self._submit(changes.trash(self.state.selected))
+
+    def restore(self) -> None:
+        """Move the selected runs from the trash back to their folder."""
+        if self.state.selected and self.state.in_trash:
+            self._submit(changes.restore(self.state.selected))
+
+    def empty_trash(self) -> None:
+        """Delete all runs in the trash for ever: the view has asked."""
+        if self.state.in_trash:
+            self._undos.clear()
+            self._submit(changes.delete(self._library.paths()))
 
     def analyse(self, *, reanalyse: bool = False) -> None:
         """Analyse the selected runs and save the results; `reanalyse` includes up-to-date ones."""
         self._set_message(EMPTY_CHIP)
-        self._analyses.submit(self._readable(), reanalyse=reanalyse)
+        self._analyses.submit(self._editable(), reanalyse=reanalyse)
         self._show_progress()
 
     def open_export(self) -> bool:
         """Prepare the export dialog for the selected runs; False if none can be exported."""
-        runs = self._readable()
+        runs = self._editable()
         if runs:
             self.export_dialog.open(runs, self.state.folder)
         return bool(runs)
@@ -173,6 +209,7 @@ class RunsPresenter(Presenter[RunsState]):
             self._submit(changes.copy(runs, self.state.folder))
         others = tuple(path for path in paths if path not in runs)
         if others:
+            self.recent.set_import_file(others[0])
             self.import_dialog.open(others, self.state.folder, self._author)
         return bool(others)
 
@@ -205,9 +242,12 @@ class RunsPresenter(Presenter[RunsState]):
         if not failure.is_cancelled:
             self._set_message(Chip(sentence(failure.message), Tone.BAD))
 
-    def _on_listed(self, runs: "tuple[RunSummary, ...]") -> None:
+    def _on_listed(self, place: tuple[str, bool], runs: "tuple[RunSummary, ...]") -> None:
         self._is_listing = False
         self._progress = None
+        if place != (self.state.folder, self.state.in_trash):
+            self.refresh()
+            return
         self._library.set_runs(runs)
         self._update(is_listed=True, total=len(runs))
         self._show_rows()
@@ -246,11 +286,27 @@ class RunsPresenter(Presenter[RunsState]):
         rows = self._library.rows(state.filter, state.sorted_by, descending=state.descending)
         shown = {row.path for row in rows}
         selected = tuple(path for path in state.selected if path in shown)
-        self._update(rows=rows, metadata=self._library.metadata(selected))
+        self._update(rows=rows, metadata=self._metadata(selected))
         self.select(selected)
+
+    def _show_place(self, **place: Any) -> None:
+        """Show another folder, or its trash; nothing is known of it yet."""
+        self._update(
+            rows=(), total=0, is_listed=False, selected=(), metadata=None, overlay=None,
+            message=EMPTY_CHIP, details=(), **place,
+        )  # fmt: skip
+        self.refresh()
+
+    def _metadata(self, paths: tuple[str, ...]) -> MetadataForm | None:
+        """Metadata to edit; none in the trash."""
+        return None if self.state.in_trash else self._library.metadata(paths)
 
     def _readable(self) -> tuple[str, ...]:
         return self._library.readable(self.state.selected)
+
+    def _editable(self) -> tuple[str, ...]:
+        """Selected runs that can be read and are not in the trash."""
+        return () if self.state.in_trash else self._readable()
 
     def _on_runs_changed(self, outcome: BatchOutcome, text: str) -> None:
         chip = changes.outcome_chip(text, outcome.done, outcome.faults)

@@ -192,6 +192,8 @@ class RunsState:
     """State of the screen."""
 
     folder: str = ""
+    in_trash: bool = False
+    """Whether the runs are those in the trash of the folder."""
     rows: tuple[RunRow, ...] = ()
     """Runs that match the filter, sorted."""
     total: int = 0  # number of runs in the folder

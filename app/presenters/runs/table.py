@@ -44,6 +44,9 @@ class RunList:
         kept = select_runs(self._by_path.values(), run_filter, by, descending=descending)
         return tuple(self._row(run) for run in kept)
 
+    def paths(self) -> tuple[str, ...]:
+        return tuple(self._by_path)
+
     def metadata(self, paths: Sequence[str]) -> MetadataForm | None:
         return metadata_form([self._by_path[path] for path in paths])
 

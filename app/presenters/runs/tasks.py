@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from msgspec import convert
 
-from analysis.catalogue import reading_units
+from analysis.catalogue import displacement_unit, reading_units_on_screen
 from analysis.formatting import with_unit
 from analysis.record import AnalysisError
 from app.presenters.base import Progress, ReportProgress, batch_progress
@@ -64,12 +64,17 @@ _PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
 """What fits into the preview of the export dialog."""
 
 
-def list_folder(folder: str, report: ReportProgress) -> tuple[RunSummary, ...]:
+def list_folder(folder: str, in_trash: bool, report: ReportProgress) -> tuple[RunSummary, ...]:
+    """Runs of a folder, or with `in_trash` those in its trash."""
     path = Path(folder)
     if not path.exists():  # the recordings folder is made by the first run
         return ()
     text = gettext("Looking at new files")
-    return tuple(list_runs(path, progress=lambda done, count: report(Progress(text, done / count))))
+
+    def on_progress(done: int, count: int) -> None:
+        report(Progress(text, done / count))
+
+    return tuple(list_runs(path, progress=on_progress, in_trash=in_trash))
 
 
 def change_runs(
@@ -159,7 +164,7 @@ def load_overlay(paths: tuple[str, ...]) -> Overlay:
     return Overlay(
         traces=tuple(_run_trace(overview) for overview in overviews),
         time_label=gettext("time from release, s") if aligned else gettext("time, s"),
-        unit=reading_units(unit)[0].symbol,
+        unit=reading_units_on_screen(unit)[0].symbol,
         message=". ".join(faults),
     )
 
@@ -175,7 +180,7 @@ def load_part(paths: tuple[str, ...], span: Span, pixels: int) -> tuple[Trace, .
 
 
 def _run_trace(overview: DecimatedRun) -> Trace:
-    scale = reading_units(overview.unit)[0].scale
+    scale = reading_units_on_screen(overview.unit)[0].scale
     table, *others = (scale * readings for readings in overview.readings)
     time_s = overview.time_s - (overview.release_s or 0.0)
     return Trace(overview.path.stem, time_s, table, others[0] if others else None, str(overview.path))
@@ -186,7 +191,7 @@ def preview_import(path: str, form: Form, report: ReportProgress) -> ImportPrevi
     plan = import_plan(form)
     unit, scale = form["unit_name"].strip() or "m", 1.0
     if unit == "m" and form["quantity"] == "displacement":
-        unit, scale = "mm", 1e3
+        unit, scale = displacement_unit().symbol, displacement_unit().scale
     with shared_reading_process().read(Path(path), plan, _reading(path, report)) as record:
         storing.check_length(Path(path), record)
         trace = _imported_trace(Path(path).stem, record, plan.measures, scale)
@@ -292,7 +297,7 @@ def _in_window(text: Message) -> str:
 
 def _result_row(run: import_run.ImportedRun) -> str:
     """Name, length, rate, range of each gauge, and release of an imported run."""
-    unit, _ = reading_units(run.unit)
+    unit, _ = reading_units_on_screen(run.unit)
     ends = ((unit.scale * low, unit.scale * high) for low, high in run.ranges)
     ranges = (with_unit(f"{low:.4g} … {high:.4g}", unit.symbol) for low, high in ends)
     release = gettext("no release found")

@@ -10,11 +10,12 @@ from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignState, CampaignSummary, Product
 from app.qt.campaign.friction_plot import FrictionPlot
-from app.qt.campaign.sections import SelectedRuns, clear, make_sections
+from app.qt.campaign.sections import SelectedRuns, make_sections
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
+from app.qt.widgets.folder_button import FolderButton, OpenFolderButton
 from app.qt.widgets.inputs import CheckBox, ProgressBar, ask_for_folder, make_button
-from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
+from app.qt.widgets.layouts import STRETCH, clear, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, show_chip
 from messages.i18n import N_, gettext, ngettext
@@ -38,6 +39,7 @@ class CampaignScreen(QWidget):
         self._shown = CampaignState("", CampaignSummary(()))
         self._title = label(role=TextRole.HEADING)
         self._message = label()
+        self._open_folder = OpenFolderButton()
         self._working = _Working(presenter)
         self._simulated = label(role=TextRole.STRONG)
         self._count_simulated = CheckBox("")
@@ -48,7 +50,8 @@ class CampaignScreen(QWidget):
         self._keep.setToolTip(gettext("Keep new results in their runs: the next gathering is quicker"))
         self._export = QPushButton(gettext("Export…"))
         self._undo = make_button(gettext("Undo"), presenter.undo)
-        self._folder = make_button(gettext("Folder…"), self._choose_folder)
+        title = gettext("Gather the runs of a folder")
+        self._folder = FolderButton(title, lambda: presenter.recent_folders, presenter.choose_folder)
         refresh = make_button(gettext("Refresh"), presenter.refresh)
         self._table = SeriesTable(theme)
         self._table.row_selected.connect(presenter.select_series)
@@ -56,14 +59,21 @@ class CampaignScreen(QWidget):
         self._plot = FrictionPlot(theme)
         self._chosen = SelectedRuns(presenter)
         self._sections = QVBoxLayout()
-        self._empty = _Empty(presenter, self._choose_folder)
+        self._empty = _Empty(presenter, self._folder.ask)
         self._stack = QStackedWidget()
         self._stack.addWidget(self._make_page())
         self._stack.addWidget(self._empty)
         buttons = (self._keep, self._export, self._undo, self._folder, refresh)
         sources = (self._simulated, self._count_simulated)
         top = make_row(self._title, *sources, (self._working, 1), *buttons, spacing=8, margins=(4, 0))
-        make_column(top, self._message, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
+        make_column(
+            top,
+            make_row(self._message, self._open_folder, STRETCH, spacing=8),
+            (self._stack, 1),
+            spacing=8,
+            margins=(8, 8),
+            of=self,
+        )
         menu = QMenu(self)
         for product in Product:
             action = menu.addAction(gettext(product.value))
@@ -72,7 +82,7 @@ class CampaignScreen(QWidget):
         add_shortcut(self, "Ctrl+E", gettext("Export table, figures or report"), self._export.showMenu)
         bind_button(self._undo, "Ctrl+Z", gettext("Take back the last leaving out or taking in"), self)
         bind_button(refresh, "F5", gettext("Gather the folder again"), self)
-        add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._choose_folder)
+        add_shortcut(self, "Ctrl+L", gettext("Gather another folder"), self._folder.ask)
 
     def show_state(self, state: CampaignState) -> None:
         old, self._shown = self._shown, state
@@ -102,6 +112,7 @@ class CampaignScreen(QWidget):
         counted = ngettext("{count} run", "{count} runs", summary.run_count)
         of_all = gettext("Campaign: {runs} in {series} series", runs=counted, series=summary.series_count)
         self._title.setText(of_all if summary.run_count else gettext("Campaign"))
+        self._folder.folder = state.folder
         self._folder.setToolTip(gettext("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
         self._keep.setText(ngettext("Keep {count} result", "Keep {count} results", summary.unsaved_count))
         self._keep.setVisible(summary.unsaved_count > 0 and state.progress is None)
@@ -114,18 +125,16 @@ class CampaignScreen(QWidget):
         self._count_simulated.setChecked(summary.simulated_counts)
         text = ngettext("{count} simulated run", "{count} simulated runs", summary.simulated_count)
         self._count_simulated.setText(text)
-
-    def _choose_folder(self) -> None:
-        title = gettext("Gather the runs of a folder")
-        ask_for_folder(self, title, self._shown.folder, self._presenter.choose_folder)
+        self._open_folder.show_folder(state.written_to)
 
     def _ask_for_target(self, product: Product) -> None:
         kinds, name = _TARGETS[product]
         export = partial(self._presenter.export, product)
+        folder = self._presenter.recent.export_folder or self._shown.folder
         if not kinds:
-            ask_for_folder(self, gettext("Export"), self._shown.folder, export)
+            ask_for_folder(self, gettext("Export"), folder, export)
             return
-        dialog = QFileDialog(self, gettext("Export"), self._shown.folder, gettext(kinds))
+        dialog = QFileDialog(self, gettext("Export"), folder, gettext(kinds))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.selectFile(name)

@@ -12,7 +12,7 @@ from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignSummary, RepeatabilityRow, RunRow
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import make_button
-from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row
+from app.qt.widgets.layouts import STRETCH, Item, clear, make_column, make_row
 from app.qt.widgets.text import label, show_chip
 from messages.i18n import gettext
 
@@ -144,10 +144,3 @@ class SelectedRuns(QWidget):
         below = make_row(friction, _chip(run.status), STRETCH, exclude, spacing=6)
         make_column(name, below, spacing=2, of=made)
         return made
-
-
-def clear(layout: QLayout) -> None:
-    """Remove and delete the widgets of a layout."""
-    while (item := layout.takeAt(0)) is not None:
-        if (widget := item.widget()) is not None:
-            widget.deleteLater()

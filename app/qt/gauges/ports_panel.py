@@ -1,7 +1,8 @@
 """Tab Ports and devices: serial ports, the devices recognised on them, buttons to connect."""
 
-from functools import partial
+from collections.abc import Callable
 
+from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QFrame, QPushButton, QWidget
 
 from app.presenters.gauges.ports import PortsPresenter
@@ -18,7 +19,9 @@ _NOT_LOOKED_AT = N_("Not looked at yet: Look at the ports (F5) listens here, and
 
 
 class PortsPanel(QWidget):
-    """Draws the list of ports."""
+    """Draws the list of ports; `chosen` says that one of them was taken."""
+
+    chosen = Signal()
 
     def __init__(self, presenter: PortsPresenter) -> None:
         super().__init__()
@@ -46,6 +49,11 @@ class PortsPanel(QWidget):
             self._shown = state.ports
             self._list.setWidget(self._rows(state.ports))
 
+    def focus_found(self) -> None:
+        """Focus the first device that was found; the button Look without one."""
+        found = self._list.findChildren(QPushButton)
+        (found[0] if found else self._look).setFocus()
+
     def add_keys(self, screen: QWidget) -> None:
         bind_button(self._look, "F5", gettext("Listen on every free port, and say what speaks there"), screen)
 
@@ -69,20 +77,39 @@ class PortsPanel(QWidget):
         buttons = []
         if card.suggested_form is not None:
             hint = gettext("Fill in the start page for {url}", url=card.url)
-            use = make_button(gettext("Use this port"), partial(self._presenter.fill_port, card.url), hint)
+            use = make_button(gettext("Use this port"), self._choice(self._presenter.fill_port, card), hint)
             use.setAccessibleName(gettext("Use {url}", url=card.url))
-            second = [self._second_button(card.url)] if is_pair else []
-            buttons.append(make_column(use, *second, STRETCH, spacing=6))
+            connect = [] if card.needs_second else [self._connect_button(card)]
+            second = [self._second_button(card)] if is_pair else []
+            buttons.append(make_column(*connect, use, *second, STRETCH, spacing=6))
         row = QFrame()
         row.setProperty("role", "card")
         make_row((make_column(*texts, spacing=4), 1), *buttons, spacing=6, margins=(12, 12), of=row)
         return row
 
-    def _second_button(self, url: str) -> QPushButton:
-        hint = gettext("Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=url)
-        second = make_button(gettext("Use for gauge 2"), partial(self._presenter.fill_second_port, url), hint)
-        second.setAccessibleName(gettext("Use {url} for gauge 2", url=url))
+    def _connect_button(self, card: PortCard) -> QPushButton:
+        hint = gettext("Connect to the device on {url} as it was found", url=card.url)
+        connect = make_button(
+            gettext("Connect"), self._choice(self._presenter.connect, card), hint, primary=True
+        )
+        connect.setAccessibleName(gettext("Connect to {url}", url=card.url))
+        return connect
+
+    def _second_button(self, card: PortCard) -> QPushButton:
+        hint = gettext(
+            "Gauge 2 has a device of its own on {url}: choose the port of gauge 1 first", url=card.url
+        )
+        choice = self._choice(self._presenter.fill_second_port, card)
+        second = make_button(gettext("Use for gauge 2"), choice, hint)
+        second.setAccessibleName(gettext("Use {url} for gauge 2", url=card.url))
         return second
+
+    def _choice(self, choose: Callable[[str], None], card: PortCard) -> Callable[[], None]:
+        def act() -> None:
+            self.chosen.emit()
+            choose(card.url)
+
+        return act
 
     def _lay_out(self) -> None:
         head = make_row(self._look, self._stop, self._query_silent, STRETCH, spacing=12)

@@ -60,6 +60,9 @@ class GaugesScreen(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         super().showEvent(event)
+        self.take_focus()
+
+    def take_focus(self) -> None:
         self._tabs.setFocus()
 
     def _add_keys(self) -> None:

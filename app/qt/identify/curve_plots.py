@@ -91,7 +91,7 @@ class CurvePlots(QWidget):
             fitted.setVisible(hand is None)
         for record in self._records:
             record.keep_picture(kept=hand is not None)
-        simulated = () if hand is None else hand.simulations_mm
+        simulated = () if hand is None else hand.simulations
         left_over = () if hand is None else hand.residuals_um
         for curves, lines in ((self._hand_simulations, simulated), (self._hand_residuals, left_over)):
             for row, curve in enumerate(curves):

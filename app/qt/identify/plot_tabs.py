@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
+from analysis.catalogue import displacement_decimals, displacement_unit
 from analysis.formatting import with_unit
 from app.presenters.identify.state import Cursor, Cursors, Motion, PlotTab, PlottedQuantity
 from app.presenters.number_text import format_fixed
@@ -43,7 +44,7 @@ _TIME_PLOTS = {
     ),
     PlotTab.RELATIVE: (
         (N_("relative acceleration u<sub>2</sub>″ − u<sub>1</sub>″, m/s²"), ("text",)),
-        (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), ("channel_2",)),
+        (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, {unit}"), ("channel_2",)),
     ),
 }
 """Titles of the plots, and colours of the lines of the tab in the same order."""
@@ -62,8 +63,9 @@ class PlotTabs(QStackedWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self.curves = CurvePlots(theme)
+        unit = displacement_unit().symbol
         self.motions = {
-            tab: TimePlots(theme, [(gettext(title), colours) for title, colours in plots])
+            tab: TimePlots(theme, [(gettext(title, unit=unit), colours) for title, colours in plots])
             for tab, plots in _TIME_PLOTS.items()
         } | {PlotTab.PHASE: PhasePlots(theme)}
         self.slips = SlipPages(theme)
@@ -202,13 +204,16 @@ class PhasePlots(QWidget):
     def _restyle(self) -> None:
         tokens = self._theme.tokens
         self.cursors.restyle(tokens)
-        for stack, axis in zip(self._stacks, ("u₁, mm", "u₂ − u₁, mm"), strict=True):
+        for stack, symbol in zip(self._stacks, ("u₁", "u₂ − u₁"), strict=True):
             stack.restyle()
-            stack.set_time_title(axis)
+            stack.set_time_title(f"{symbol}, {displacement_unit().symbol}")
         for curve, token in zip(self._curves, (tokens.channel_1, tokens.channel_2), strict=True):
             curve.setPen(pen(token))
 
 
-def _format_phase(displacement_mm: float, velocity_mm_per_s: float) -> str:
-    places = (displacement_mm, 3, "mm"), (velocity_mm_per_s, 2, "mm/s")
+def _format_phase(displacement: float, velocity_mm_per_s: float) -> str:
+    places = (
+        (displacement, displacement_decimals(3), displacement_unit().symbol),
+        (velocity_mm_per_s, 2, "mm/s"),
+    )
     return "   ".join(with_unit(format_fixed(value, decimals), unit) for value, decimals, unit in places)

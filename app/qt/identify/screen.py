@@ -10,6 +10,7 @@ from app.presenters.base import Chip, Tone
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.state import Cursors, IdentifyState, PlotTab
 from app.qt.identify.cursors import CursorBar
+from app.qt.identify.export_menu import ExportMenu, ReportLine
 from app.qt.identify.plot_tabs import PlotTabs
 from app.qt.identify.results_panel import ResultsPanel
 from app.qt.identify.scan_plot import ScanPlot
@@ -30,9 +31,15 @@ _OTHER_KINDS = {None: "", "one-mass": N_("Analyse as one mass"), "two-mass": N_(
 
 
 class IdentifyScreen(QWidget):
-    """Draws `IdentifyState`; `ask_for_run` lets the operator choose a recording."""
+    """Draws `IdentifyState`; `ask_for_run` lets the operator choose a recording, `export_run` exports one."""
 
-    def __init__(self, theme: Theme, presenter: IdentifyPresenter, ask_for_run: Callable[[], None]) -> None:
+    def __init__(
+        self,
+        theme: Theme,
+        presenter: IdentifyPresenter,
+        ask_for_run: Callable[[], None],
+        export_run: Callable[[str], None] = lambda _path: None,
+    ) -> None:
         super().__init__()
         self._presenter = presenter
         self._shown = IdentifyState()
@@ -44,6 +51,11 @@ class IdentifyScreen(QWidget):
         self._cursors = QPushButton(gettext("Cursors"))
         self._cursors.setCheckable(True)
         bind_button(self._cursors, "C", gettext("Two cursors, and the differences between them"), self)
+        self._export = ExportMenu(presenter.report, export_run)
+        self._export.add_keys(self)
+        self._report_line = ReportLine()
+        presenter.report.attach(self._export)
+        presenter.report.attach(self._report_line)
         self._tabs = QTabBar()
         self._no_motion = label(gettext(_NO_MOTION), TextRole.LABEL, muted=True, wrap=True)
         self._no_motion.setContentsMargins(16, 0, 16, 0)
@@ -57,9 +69,9 @@ class IdentifyScreen(QWidget):
         self._stack = QStackedWidget()
         self._stack.addWidget(self._waiting)
         self._stack.addWidget(self._results_page())
-        top = make_row((self._title, 1), self._cursors, self._kind, self._open, spacing=8)
+        top = make_row((self._title, 1), self._cursors, self._kind, self._export, self._open, spacing=8)
         top.setContentsMargins(4, 0, 0, 0)
-        make_column(top, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
+        make_column(top, self._report_line, (self._stack, 1), spacing=8, margins=(8, 8), of=self)
         self._connect(presenter)
 
     def show_state(self, state: IdentifyState) -> None:
@@ -68,6 +80,7 @@ class IdentifyScreen(QWidget):
         has_run = state.curves is not None and state.progress is None
         self._open.setVisible(has_run)
         self._cursors.setVisible(has_run)
+        self._export.setVisible(has_run)
         self._kind.setVisible(has_run and state.alternative_kind is not None)
         if not has_run:
             self._waiting.show_state(state)

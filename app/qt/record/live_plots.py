@@ -7,6 +7,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
+from analysis.catalogue import MILLIMETRE, displacement_decimals, displacement_unit
 from app.presenters.record.state import Span, TraceMarks, Traces
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column
@@ -16,8 +17,8 @@ from app.qt.widgets.plots import Plot, PlotStack, value_at
 from messages.i18n import N_, gettext
 
 TITLES = (
-    (N_("table displacement u<sub>1</sub>, mm"), "channel_1"),
-    (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, mm"), "channel_2"),
+    (N_("table displacement u<sub>1</sub>, {unit}"), "channel_1"),
+    (N_("relative displacement u<sub>2</sub> − u<sub>1</sub>, {unit}"), "channel_2"),
 )
 _NAMES = (N_("table displacement"), N_("relative displacement"))
 
@@ -33,8 +34,12 @@ class LivePlots(QWidget):
     def __init__(self, theme: Theme) -> None:
         super().__init__()
         self._theme = theme
-        titles = [(gettext(text), token) for text, token in TITLES]
+        unit = displacement_unit()
+        titles = [(gettext(text, unit=unit.symbol), token) for text, token in TITLES]
         self._stack = PlotStack(theme, titles)
+        self._scale = unit.scale / MILLIMETRE.scale
+        for plot in self._stack.plots:
+            plot.left.setScale(self._scale)
         self._stack.resized.connect(self.resized)
         self._stack.hovered.connect(self._hover)
         self._traces = Traces()
@@ -107,7 +112,8 @@ class LivePlots(QWidget):
         for row, line in enumerate((self._traces.table, self._traces.relative)):
             value = value_at(line.time_s, line.value, self._pointed_s)
             at_s = math.nan if math.isnan(value) else self._pointed_s
-            self._stack.show_values(row, at_s, [value], "mm")
+            unit, decimals = displacement_unit().symbol, displacement_decimals(3)
+            self._stack.show_values(row, at_s, [self._scale * value], unit, decimals)
 
 
 def _limits(traces: Traces) -> tuple[float, float]:

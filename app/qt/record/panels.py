@@ -2,11 +2,13 @@
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QEvent, QRectF, QSize, Qt
-from PySide6.QtGui import QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtCore import QRectF, QSize, Qt
+from PySide6.QtGui import QPainter, QPaintEvent
 from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QSizePolicy, QWidget
 
+from analysis.catalogue import MILLIMETRE, displacement_unit
 from app.presenters.base import Chip, Progress, Tone
+from app.presenters.number_text import format_displacement
 from app.presenters.record import state as record
 from app.presenters.record.state import Action, NoteEdited, StepStatus
 from app.presenters.results import Result
@@ -39,8 +41,8 @@ class GuidancePanel(QWidget):
         self._estimates = _value_labels(_ESTIMATES_MAX)
         self._note = label(muted=True, wrap=True)
         self._readings = (
-            _Reading(gettext("u<sub>1</sub>, mm"), "1"),
-            _Reading(gettext("u<sub>2</sub> − u<sub>1</sub>, mm"), "2"),
+            _Reading(f"u<sub>1</sub>, {displacement_unit().symbol}", "1"),
+            _Reading(f"u<sub>2</sub> − u<sub>1</sub>, {displacement_unit().symbol}", "2"),
         )
         self._origin = label(role=TextRole.LABEL, muted=True)
         make_column(
@@ -154,7 +156,11 @@ class TargetBar(QWidget):
         self._target = target
         if target is not None:
             self.setAccessibleName(
-                gettext("Pulled {now:.1f} of {target:.1f} mm", now=target.now_mm, target=target.target_mm)
+                gettext(
+                    "Pulled {now} of {target}",
+                    now=format_displacement(target.now_mm / MILLIMETRE.scale),
+                    target=format_displacement(target.target_mm / MILLIMETRE.scale),
+                )
             )
         self.update()
 
@@ -263,7 +269,7 @@ class DecisionPanel(QFrame):
 
     def _button(self, action: Action) -> QPushButton:
         text, key, keys, description = _DECISION_BUTTONS[action]
-        button = _EnterButton(f"{gettext(text)}\n{key}")
+        button = QPushButton(f"{gettext(text)}\n{key}")
         button.setProperty("scale", "large")
         button.clicked.connect(lambda: self._dispatch(action))
         if keys:
@@ -271,17 +277,3 @@ class DecisionPanel(QFrame):
         else:  # the run bar has the shortcut
             button.setToolTip(gettext(description))
         return button
-
-
-class _EnterButton(QPushButton):
-    """Button that Enter presses while it has the focus, even if Enter is a shortcut of the screen."""
-
-    def event(self, event: QEvent) -> bool:
-        is_enter = isinstance(event, QKeyEvent) and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter)
-        if is_enter and event.type() == QEvent.Type.ShortcutOverride:
-            event.accept()
-            return True
-        if is_enter and event.type() == QEvent.Type.KeyPress:
-            self.click()
-            return True
-        return super().event(event)

@@ -80,9 +80,10 @@ class RunBar(QFrame):
         self._connect()
 
     def show_choices(self, choices: RunChoices, plan: PlanState) -> None:
-        self._shown = choices
-        if self._series.count() != len(choices.all_series):
+        if choices.all_series != self._shown.all_series:
+            self._series.clear()
             self._series.addItems(choices.all_series)
+        self._shown = choices
         self._series.setCurrentText(choices.series)
         choosable = choices.editable and not choices.series_fixed
         self._series.setEnabled(choosable)
@@ -105,11 +106,6 @@ class RunBar(QFrame):
     def show_stop(self, disarms: bool) -> None:
         """Say whether Stop keeps a run or none."""
         self._name(Action.STOP, _DISARM if disarms else None)
-
-    def take_focus(self) -> None:
-        usable = [button for button in self._buttons.values() if button.isEnabled()]
-        usable.sort(key=lambda button: button.property("primary") != "true")
-        (usable[0] if usable else self).setFocus()
 
     def _show_summary(self) -> None:
         choices = self._shown

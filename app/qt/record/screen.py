@@ -45,10 +45,10 @@ class RecordScreen(QWidget):
         self._plots.zoomed.connect(lambda span: presenter.dispatch(PlotZoomed(span)), later)
         self._guidance = GuidancePanel(theme, connect_device)
         self._result = ResultPanel()
-        self._decision = DecisionPanel(presenter.dispatch, self._take_focus)
+        self._decision = DecisionPanel(presenter.dispatch, self.take_focus)
         self._status_line = StatusLine(lambda: presenter.dispatch(Action.UNDO))
         self._column = _Column((self._guidance, self._result), (self._decision, self._status_line))
-        self._bar = RunBar(presenter.dispatch, self._edit_plan, self._take_focus)
+        self._bar = RunBar(presenter.dispatch, self._edit_plan, self.take_focus)
         self._plan: PlanDialog | None = None
         self._sound = CuePlayer()
         self._parts: dict[str, Callable[[Any], None]] = {
@@ -68,7 +68,6 @@ class RecordScreen(QWidget):
     def show_state(self, state: RecordState) -> None:
         """Show the parts of a state that differ from the state shown."""
         old, self._shown = self._shown, state
-        focused = QApplication.focusWidget()
         for name, show in self._parts.items():
             if old is None or getattr(state, name) != getattr(old, name):
                 show(getattr(state, name))
@@ -76,36 +75,39 @@ class RecordScreen(QWidget):
         if old is None or (state.choices, state.plan) != (old.choices, old.plan):
             self._bar.show_choices(state.choices, state.plan)
             if self._plan is not None:
-                self._plan.show_plan(state.plan)
+                self._plan.show_plan(state.plan, state.choices.series)
         if old is None or (state.status_message, state.undo) != (old.status_message, old.undo):
             self._status_line.show_status(state.status_message, state.undo)
         if old is None or _actions(state) != _actions(old):
             self._bar.show_actions(state.allowed, state.primary, keeps=state.decision is not None)
             self._decision.show_decision(state.decision, state.allowed)
+            is_asked = old is not None and (state.decision is None) is not (old.decision is None)
+            focused = QApplication.focusWidget()
             is_typing = isinstance(focused, QLineEdit) and focused.isVisible()
-            if self.isVisible() and not is_typing:
-                self._take_focus()  # a disabled button passes the focus on, perhaps to a field
+            if is_asked and self.isVisible() and not is_typing:
+                self.take_focus()
         if state.cue is not None and (old is None or state.cue is not old.cue):
             self._sound.play(state.cue)
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         super().showEvent(event)
-        self._take_focus()
+        self.take_focus()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
         narrowest, widest = _COLUMN_WIDTHS
         self._column.setFixedWidth(min(max(round(self.width() * _COLUMN_SHARE), narrowest), widest))
 
-    def _take_focus(self) -> None:
+    def take_focus(self) -> None:
+        """Focus Keep while a run waits for a decision, else no button: none is pressed by mistake."""
         decides = self._shown is not None and self._shown.decision is not None
-        (self._decision if decides else self._bar).take_focus()
+        (self._decision.take_focus if decides else self.setFocus)()
 
     def _edit_plan(self) -> None:
         if self._plan is None:
             self._plan = PlanDialog(self._presenter, self)
         if self._shown is not None:
-            self._plan.open_with(self._shown.plan)
+            self._plan.open_with(self._shown.plan, self._shown.choices.series)
 
     def _show_result(self, result: Result | None) -> None:
         if result is not None:

@@ -9,6 +9,7 @@ from app.presenters.base import Chip
 from app.presenters.runs.export_presenter import CONTENTS, FORMATS, ExportPresenter, ExportState
 from app.qt.theme import TextRole
 from app.qt.widgets import inputs
+from app.qt.widgets.folder_button import OpenFolderButton
 from app.qt.widgets.layouts import make_column, make_form_grid, make_row
 from app.qt.widgets.text import label, set_text_or_hide, show_chip
 from messages.i18n import gettext, ngettext
@@ -31,6 +32,7 @@ class ExportDialog(QDialog):
         self._bar = inputs.ProgressBar()
         self._message = label(wrap=True)
         self._details = label(muted=True, wrap=True)
+        self._open_folder = OpenFolderButton()
         self._export = inputs.make_primary_button(gettext("Export"))
         self._export.setDefault(True)
         self._lay_out()
@@ -60,6 +62,7 @@ class ExportDialog(QDialog):
         self._bar.show_progress(state.progress)
         show_chip(self._message, Chip(state.progress.text) if state.progress is not None else state.message)
         set_text_or_hide(self._details, "\n".join(state.details))
+        self._open_folder.show_folder(state.written_to)
         self._export.setEnabled(state.progress is None)
 
     def _choose_output(self) -> None:
@@ -91,7 +94,7 @@ class ExportDialog(QDialog):
             self._form(),
             label(gettext("Preview of the first run"), TextRole.LABEL, muted=True),
             (self._preview, 1),
-            self._message,
+            make_row((self._message, 1), self._open_folder, spacing=8),
             self._details,
             buttons,
             spacing=12,

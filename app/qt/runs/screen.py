@@ -13,7 +13,8 @@ from app.qt.runs.preview import RunsPreview
 from app.qt.runs.selected_runs import ActionBar, MetadataEditor
 from app.qt.runs.table import RunsTable
 from app.qt.theme import TextRole, Theme
-from app.qt.widgets.inputs import ComboBox, ask_for_folder, make_button, make_choice
+from app.qt.widgets.folder_button import FolderButton
+from app.qt.widgets.inputs import ComboBox, ask, make_button, make_choice
 from app.qt.widgets.layouts import make_column, make_frame, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import label
@@ -41,7 +42,9 @@ class RunsScreen(QWidget):
         self._status = make_choice({status: status.value for status in StatusFilter})
         self._count = label(muted=True)
         self._import = make_button(gettext("Import…"), self._choose_files)
-        self._folder = make_button(gettext("Folder…"), self._choose_folder)
+        title = gettext("Show the runs of a folder")
+        self._folder = FolderButton(title, lambda: presenter.recent_folders, presenter.choose_folder)
+        self._trash = make_button("", self._toggle_trash)
         self._table = RunsTable(theme)
         self._empty = label(role=TextRole.HEADING, muted=True, wrap=True)
         self._middle = QStackedWidget()
@@ -50,7 +53,7 @@ class RunsScreen(QWidget):
         side = QWidget()
         make_column((self._preview, 1), self._metadata, spacing=6, of=side)
         self._side = make_frame(side)
-        self._actions = ActionBar(presenter, dialogs.ask_for_export)
+        self._actions = ActionBar(presenter, dialogs.ask_for_export, self._ask_to_empty)
         self._lay_out()
         self._connect()
         self.setAcceptDrops(True)
@@ -58,12 +61,16 @@ class RunsScreen(QWidget):
     def show_state(self, state: RunsState) -> None:
         old, self._shown = self._shown, state
         if old is None or state.all_series != old.all_series:
+            self._series.clear()
             self._series.addItems([gettext(_ALL_SERIES), *state.all_series])
+            self._show_wanted(state.filter)
         if old is not None and state.filter != old.filter:
             self._show_wanted(state.filter)
         if old is None or state.rows is not old.rows or state.selected != old.selected:
             self._table.show_rows(state.rows, state.selected)
         self._table.show_order(state.sorted_by, descending=state.descending)
+        self._trash.setText(gettext("Show runs") if state.in_trash else gettext("Show trash"))
+        self._import.setEnabled(not state.in_trash)
         self._show_middle(state)
         if old is None or state.overlay is not old.overlay:
             self._preview.show_overlay(state.overlay)
@@ -83,7 +90,10 @@ class RunsScreen(QWidget):
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         super().showEvent(event)
-        self._table.setFocus()
+        self.take_focus()
+
+    def take_focus(self) -> None:
+        (self._table if self._table.isVisible() else self).setFocus()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
@@ -104,7 +114,9 @@ class RunsScreen(QWidget):
             self._dialogs.show_import()
 
     def _choose_files(self) -> None:
-        dialog = QFileDialog(self, gettext("Import records of other programs"))
+        dialog = QFileDialog(
+            self, gettext("Import records of other programs"), self._presenter.recent.import_folder
+        )
         endings = " ".join(f"*{suffix}" for suffix in (*SUFFIXES, RUN_SUFFIX))
         dialog.setNameFilters([gettext("Records ({endings})", endings=endings), gettext("All files (*)")])
         dialog.setFileMode(QFileDialog.FileMode.ExistingFiles)
@@ -112,13 +124,29 @@ class RunsScreen(QWidget):
         dialog.filesSelected.connect(self._take_files)
         dialog.open()
 
+    def _toggle_trash(self) -> None:
+        self._presenter.show_trash(not self._presenter.state.in_trash)
+
+    def _ask_to_empty(self) -> None:
+        count = self._presenter.state.total
+        text = ngettext("Delete {count} run for ever?", "Delete {count} runs for ever?", count)
+        detail = gettext(
+            "The trash of {folder} is emptied. Nothing brings a deleted run back.",
+            folder=self._presenter.state.folder,
+        )
+        delete = ngettext("Delete {count} run", "Delete {count} runs", count)
+        ask(self, text, detail, delete, self._presenter.empty_trash)
+
     def _show_middle(self, state: RunsState) -> None:
         count = ngettext("{count} run", "{count} runs", state.total)
+        if state.in_trash:
+            count = gettext("Trash: {runs}", runs=count)
         if state.filter != RunFilter():
             count = gettext("{shown} of {total}", shown=len(state.rows), total=count)
         self._count.setText(count if state.is_listed else "")
         hint = gettext("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder)
         self._folder.setToolTip(hint)
+        self._folder.folder = state.folder
         self._empty.setText(_empty_text(state))
         was_empty = self._middle.currentIndex() == 1
         self._middle.setCurrentIndex(0 if state.rows else 1)
@@ -130,13 +158,10 @@ class RunsScreen(QWidget):
         status = StatusFilter(self._status.currentData())
         self._presenter.set_filter(RunFilter(self._text.text(), series, status))
 
-    def _choose_folder(self) -> None:
-        folder = self._shown.folder if self._shown else ""
-        ask_for_folder(self, gettext("Show the runs of a folder"), folder, self._presenter.choose_folder)
-
     def _connect(self) -> None:
         for changed in (self._text.textChanged, self._series.activated, self._status.activated):
             changed.connect(lambda _: self._apply_filter())
+        bind_button(self._trash, "Ctrl+T", gettext("Runs in the trash, or those of the folder again"), self)
         bind_button(self._import, "Ctrl+I", gettext("Records of other programs, which become runs"), self)
         self._table.selected.connect(self._presenter.select)
         self._table.sort_requested.connect(self._presenter.sort_by)
@@ -144,7 +169,7 @@ class RunsScreen(QWidget):
         self._preview.zoomed.connect(self._presenter.zoom_overlay)
         self._metadata.edited.connect(self._presenter.edit)
         add_shortcut(self, "Ctrl+F", gettext("Search"), self.focus_search)
-        add_shortcut(self, "Ctrl+L", gettext("Show the runs of another folder"), self._choose_folder)
+        add_shortcut(self, "Ctrl+L", gettext("Show the runs of another folder"), self._folder.ask)
         add_shortcut(self, "F5", gettext("Look into the folder again"), self._presenter.refresh)
         self._actions.add_keys(self, self._table)
 
@@ -155,7 +180,14 @@ class RunsScreen(QWidget):
         self._series.setAccessibleName(gettext("Series"))
         self._status.setAccessibleName(gettext("Which runs"))
         top = make_row(
-            (self._text, 1), self._series, self._status, self._count, self._import, self._folder, spacing=8
+            (self._text, 1),
+            self._series,
+            self._status,
+            self._count,
+            self._import,
+            self._folder,
+            self._trash,
+            spacing=8,
         )
         self._middle.addWidget(self._table)
         self._empty.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -168,6 +200,8 @@ class RunsScreen(QWidget):
 def _empty_text(state: RunsState) -> str:
     if not state.is_listed:
         return gettext("Looking into the folder")
+    if state.in_trash and not state.total:
+        return gettext("The trash of {folder} is empty.", folder=state.folder)
     if state.total:
         return gettext("No run is like that. Change the words above, or choose All runs.")
     return gettext(

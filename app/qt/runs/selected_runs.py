@@ -19,7 +19,9 @@ from messages.i18n import gettext
 class ActionBar(QFrame):
     """Buttons, the progress of work, and its outcome with details to unfold."""
 
-    def __init__(self, presenter: RunsPresenter, ask_for_export: Callable[[], None]) -> None:
+    def __init__(
+        self, presenter: RunsPresenter, ask_for_export: Callable[[], None], empty_trash: Callable[[], None]
+    ) -> None:
         super().__init__()
         self.setProperty("role", "bar")
         self._open = _button(gettext("Open"), presenter.open_selected)
@@ -27,6 +29,9 @@ class ActionBar(QFrame):
         self._analyse_anew = partial(presenter.analyse, reanalyse=True)
         self._export = _button(gettext("Export…"), ask_for_export)
         self._trash = _button(gettext("Trash"), presenter.trash)
+        self._restore = _button(gettext("Restore"), presenter.restore)
+        self._empty = _button(gettext("Empty trash…"), empty_trash)
+        self._empty.setToolTip(gettext("Delete all runs in the trash for ever"))
         self._undo = _button(gettext("Undo"), presenter.undo)
         self._message = label(wrap=True)
         self._details = _button(gettext("Details"), self._fold)
@@ -45,6 +50,7 @@ class ActionBar(QFrame):
                 "R", gettext("Identify what is not up to date of the selected runs, and keep it")
             ),
             self._trash: ("Del", gettext("Put the selected runs aside; undo brings them back")),
+            self._restore: ("Ins", gettext("Bring the selected runs back from the trash")),
         }  # fmt: skip
         for button, (keys, words) in in_table.items():
             bind_button(button, keys, words, table, focused=True)
@@ -54,9 +60,13 @@ class ActionBar(QFrame):
         bind_button(self._undo, "Ctrl+Z", gettext("Take the last change back"), screen)
 
     def show_state(self, state: RunsState) -> None:
-        some = bool(state.selected)
-        for button in (self._open, self._trash):
-            button.setEnabled(some)
+        for button in (self._analyse, self._export, self._trash):
+            button.setVisible(not state.in_trash)
+        for button in (self._restore, self._empty):
+            button.setVisible(state.in_trash)
+        for button in (self._open, self._trash, self._restore):
+            button.setEnabled(bool(state.selected))
+        self._empty.setEnabled(state.total > 0 and state.progress is None)
         for button in (self._analyse, self._export):
             button.setEnabled(state.metadata is not None)
         self._undo.setEnabled(bool(state.undo_text))
@@ -81,7 +91,8 @@ class ActionBar(QFrame):
         self._list.setVisible(not self._list.isVisible())
 
     def _lay_out(self) -> None:
-        buttons = make_row(self._open, self._analyse, self._export, self._trash, self._undo, spacing=8)
+        work = (self._open, self._analyse, self._export, self._trash, self._restore, self._empty, self._undo)
+        buttons = make_row(*work, spacing=8)
         line = make_row(buttons, (self._message, 1), self._details, self._bar, self._cancel, spacing=8)
         line.insertSpacing(1, 8)
         make_column(line, self._list, spacing=6, margins=(12, 8), of=self)

@@ -11,7 +11,7 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor
+from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from app.presenters.base import Tone
@@ -26,6 +26,7 @@ _RIGHT = {Column.FRICTION, Column.DURATION}
 _WIDTHS = (220, 128, 84, 148, 124, 180, 104, 84, 92)
 """Of `Column` in this order."""
 _LINE_HEIGHT = 28
+_ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down)
 
 
 class RunsTable(QTableView):
@@ -78,6 +79,12 @@ class RunsTable(QTableView):
             self._select(rows, set(selected))
         model.blockSignals(False)
         self.viewport().update()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802
+        """Let arrows select the only row too, which they cannot leave."""
+        super().keyPressEvent(event)
+        if event.key() in _ARROWS and not self._selected_paths():
+            self.selectRow(self.currentIndex().row())
 
     def _select(self, rows: tuple[RunRow, ...], chosen: set[str]) -> None:
         model, last = self.selectionModel(), len(_COLUMNS) - 1

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QFileDialog,
     QLineEdit,
+    QMessageBox,
     QPlainTextEdit,
     QProgressBar,
     QPushButton,
@@ -117,6 +118,18 @@ def ask_for_folder(parent: QWidget, title: str, start: str, choose: Callable[[st
     dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     dialog.fileSelected.connect(choose)
     dialog.open()
+
+
+def ask(parent: QWidget, text: str, detail: str, action: str, act: Callable[[], object]) -> None:
+    """Ask before `act`, whose button is `action`; Cancel is the default, and nothing waits for the answer."""
+    box = QMessageBox(QMessageBox.Icon.Warning, "Slipstand", text, parent=parent)
+    box.setInformativeText(detail)
+    box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+    box.addButton(action, QMessageBox.ButtonRole.AcceptRole).clicked.connect(lambda _checked: act())
+    cancel = box.addButton(gettext("Cancel"), QMessageBox.ButtonRole.RejectRole)
+    box.setDefaultButton(cancel)
+    box.setEscapeButton(cancel)
+    box.open()
 
 
 ESCAPE = frozenset({Qt.Key.Key_Escape})

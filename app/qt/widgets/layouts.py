@@ -115,3 +115,10 @@ def make_scroll_area(
     if content is not None:
         area.setWidget(content)
     return area
+
+
+def clear(layout: QLayout) -> None:
+    """Remove and delete the widgets of a layout."""
+    while (item := layout.takeAt(0)) is not None:
+        if (widget := item.widget()) is not None:
+            widget.deleteLater()

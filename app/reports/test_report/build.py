@@ -35,11 +35,7 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
     with Validator() as validator:
         if len(gathered.runs) == 1 and not (gathered.failures or gathered.excluded):
             (run,) = gathered.runs
-            path = Path(run.name)
-            analysis = repeat_saved_analysis(path, validator)
-            series = analysis.run.metadata.series
-            subtitle = f"{series}, {path.name}" if series else path.name
-            return _report(head, subtitle, run_sections(analysis, compute_fingerprint(path), run.excluded))
+            return _run_report(Path(run.name), head, validator, run.excluded)
         chosen = representative_runs(content.campaign, gathered.runs) if content.campaign.rows else []
         material = CampaignReportInput(
             content,
@@ -50,6 +46,21 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
         )
     subtitle = f"Campaign of {len(gathered.runs)} runs in {len(content.campaign.rows)} series"
     return _report(head, subtitle, campaign_sections(material))
+
+
+def build_run_report(path: Path, head: ReportHead) -> Report:
+    """Build the report of one run. Raises RunError, AnalysisError."""
+    with Validator() as validator:
+        return _run_report(path, head, validator)
+
+
+def _run_report(path: Path, head: ReportHead, validator: Validator, excluded: str = "") -> Report:
+    """Build the report of a run; `excluded` is why it does not count, where the run does not say so."""
+    analysis = repeat_saved_analysis(path, validator)
+    metadata = analysis.run.metadata
+    subtitle = f"{metadata.series}, {path.name}" if metadata.series else path.name
+    sections = run_sections(analysis, compute_fingerprint(path), excluded or metadata.excluded)
+    return _report(head, subtitle, sections)
 
 
 def _report(head: ReportHead, subtitle: str, sections: list[Section]) -> Report:

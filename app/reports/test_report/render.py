@@ -33,6 +33,12 @@ def render_pdf(report: Report) -> bytes:
     return made if isinstance(made, bytes) else b""
 
 
+def render_pages(report: Report, dots_per_inch: float) -> list[bytes]:
+    """Typeset a report as a PNG image a page, for a printer. Raises WriteError."""
+    made = typeset_report(report, format="png", ppi=dots_per_inch)
+    return made if isinstance(made, list) else [made or b""]
+
+
 def typeset_report(report: Report, **options: Any) -> bytes | list[bytes] | None:
     """Typeset a report; `options` are those of `typst.Compiler.compile`. Raises WriteError."""
     document = msgspec.json.encode(_printable(msgspec.to_builtins(report))).decode()

@@ -1,6 +1,7 @@
 """The Campaign presenter: table, figure, findings, exclusions and navigation."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -245,6 +246,9 @@ def test_products_are_written(stage: Stage) -> None:
     assert stage.asked() == ("write_product", SCOPE, Product.TABLE, "/tmp/t.csv")
     stage.last.done(("/tmp/t.csv",))
     assert stage.presenter.state.message.text == "Wrote /tmp/t.csv"
+    assert stage.presenter.state.written_to == stage.presenter.recent.export_folder == str(Path("/tmp"))
+    stage.presenter.exclude_run(path_of("1FFM1", 2), "")
+    assert stage.presenter.state.written_to == "", "the message is about something else now"
     stage.presenter.export(Product.REPORT, "/tmp/r.pdf")
     stage.last.fail("the disk is full. Free some room")
     assert stage.presenter.state.message.text == "The disk is full. Free some room"

@@ -69,6 +69,16 @@ def test_a_late_preview_is_not_shown() -> None:
     assert desk.export.state.preview == "json"
 
 
+def test_the_folder_of_an_export_can_be_opened_and_is_that_of_the_next_one() -> None:
+    desk = Desk(RUNS[0])
+    desk.export.set_output("/elsewhere/mine.csv")
+    desk.export.export()
+    desk.exports[-1].done(BatchOutcome(("/elsewhere/mine.csv",)))
+    assert desk.export.state.written_to.replace("\\", "/") == "/elsewhere"
+    desk.export.open((RUNS[1],), "/runs")
+    assert (desk.output, desk.export.state.written_to) == ("/elsewhere/b.csv", "")
+
+
 def test_one_export_at_a_time_and_its_outcome_in_words() -> None:
     desk = Desk(*RUNS)
     desk.export.export()

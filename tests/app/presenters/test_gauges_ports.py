@@ -51,6 +51,7 @@ def test_what_speaks_is_said_and_connects_as_suggested() -> None:
     )
     assert settings.rate_hz == 80.4
     assert settings.device == COLUMNS
+    assert not card.needs_second
 
 
 def test_that_a_device_is_unverified_and_its_line_are_told_in_the_language_of_the_window(
@@ -71,6 +72,7 @@ def test_a_device_of_one_gauge_wants_another_and_its_usual_baud_is_left_to_it() 
     assert card.description[0].startswith("1 gauge, so choose the port of gauge 2 too")
     assert card.suggested_form is not None
     assert card.suggested_form.baud == ""
+    assert card.needs_second
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,9 @@ class Desk:
     def fill_second_port(self, url: str) -> None:
         self.went.append(url)
 
+    def connect_device(self, form: ConnectForm) -> None:
+        self.went.append(("connect", form))
+
     def reconnect(self) -> None:
         self.went.append("again")
 
@@ -218,6 +221,15 @@ def test_ports_are_listed_and_probed_without_sending_unless_asked(desk: Desk) ->
     desk.presenter.enter()
     desk.prober.calls[-1].done((PortCard("COM7"), PortCard("COM9")))
     assert desk.presenter.ports.state.ports == (cards[0], PortCard("COM9")), "what was found stays known"
+
+
+def test_what_was_found_is_connected_as_it_was_found(desk: Desk) -> None:
+    desk.presenter.ports.probe()
+    form = ConnectForm("COM7", "csv", "9600")
+    desk.prober.calls[-1].done((PortCard("COM7", suggested_form=form),))
+    desk.presenter.ports.connect("COM8")
+    desk.presenter.ports.connect("COM7")
+    assert desk.went == [("connect", form)]
 
 
 def test_looking_can_be_given_up(desk: Desk) -> None:

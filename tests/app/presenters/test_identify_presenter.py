@@ -14,6 +14,7 @@ from app.presenters.analysed_run import AnalysisTask, Channel, Objective
 from app.presenters.base import Progress, Tone
 from app.presenters.identify.plot_data import measured_lines
 from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.report import ReportPresenter
 from app.presenters.identify.result_tables import classical_rows
 from app.presenters.identify.state import Cursor, ManualFit, PlotLine, Span
 from messages.message import message
@@ -29,7 +30,7 @@ class Stage:
 
     def __init__(self) -> None:
         self.worker = FakeWorker()
-        self.presenter = IdentifyPresenter(self.worker)  # type: ignore[arg-type]
+        self.presenter = IdentifyPresenter(self.worker, ReportPresenter(FakeWorker()))  # type: ignore[arg-type]
         self.presenter.on_opening(RUN)
 
     def show(self, **changes: Any) -> None:

@@ -38,7 +38,7 @@ def test_a_run_is_simulated_by_hand_where_and_as_finely_as_it_is_drawn(path: str
     friction = 0.104
     span = Span(0.5, 4.5, 300, HELD_S)
     hand = simulate_friction(AnalysisTask(path), friction, span)
-    table, relative = hand.simulations_mm
+    table, relative = hand.simulations
     assert len(table.time_s) <= 2.5 * span.pixels
     assert (table.time_s[0], table.time_s[-1]) == pytest.approx((span.start_s, span.end_s), abs=0.02)
     other = TwoMassParameters(

@@ -3,7 +3,16 @@
 import pytest
 
 from app.presenters.base import Chip, Tone
-from app.presenters.runs.changes import Change, copy, edit, outcome_chip, parse_field, trash
+from app.presenters.runs.changes import (
+    Change,
+    copy,
+    delete,
+    edit,
+    outcome_chip,
+    parse_field,
+    restore,
+    trash,
+)
 from app.presenters.runs.state import Column, RunFilter
 from app.presenters.runs.table import RunList
 from app.presenters.runs.tasks import MAX_OVERLAID_RUNS, load_overlay
@@ -43,6 +52,9 @@ def test_what_cannot_be_is_refused(field: str, text: str, words: str) -> None:
         (undo(EDIT, *TWO), "Undone in 2 runs"),
         (TRASH, "Moved 2 runs to the trash"),
         (undo(TRASH, *TWO), "Brought back 2 runs"),
+        (restore(TWO), "Brought back 2 runs"),
+        (undo(restore(TWO), *TWO), "Moved 2 runs to the trash"),
+        (delete(TWO), "Deleted 2 runs"),
         (COPY, "Copied 2 runs into this folder"),
     ],
 )
@@ -56,7 +68,12 @@ def test_the_way_back_leads_to_where_the_runs_are_now() -> None:
     assert restore.undone_text == "move of 2 runs to the trash"
     assert (undo(EDIT, *TWO).paths, undo(EDIT, *TWO).arguments) == (TWO, ("me", ("plate_mass_kg",)))
     assert undo(EDIT, *TWO).undone_text == "change of plate mass"
-    assert COPY.undo is None
+    assert COPY.undo is delete(TWO).undo is None
+
+
+@pytest.mark.parametrize("change", [EDIT, TRASH, restore(TWO)])
+def test_what_undoes_a_change_is_not_undone_itself(change: Change) -> None:
+    assert undo(change, *TWO).undo is None
 
 
 @pytest.mark.parametrize(

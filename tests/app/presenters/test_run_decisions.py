@@ -562,6 +562,12 @@ def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
     assert desk.tasks() == []
 
 
+def test_runs_are_counted_anew_when_the_screen_is_shown_again() -> None:
+    desk = Desk()
+    desk.record.enter()
+    assert desk.tasks() == [CountCompletedRuns("/recordings")]
+
+
 def test_tare_shows_from_here_and_changes_nothing_that_is_stored() -> None:
     desk = Desk()
     desk.recorder.rows = rows_between(0.0, 1.5)

@@ -41,7 +41,7 @@ C = run("c", 3, series="2SSM1", plate_mass_kg=42.0)
 D = run("d", 4, analyses=1, friction_dynamic=0.2, friction_dynamic_uncertainty=0.01, adequate=False)
 BAD = RunSummary(path="/runs/bad.h5", fault=message("/runs/bad.h5 is not an HDF5 file. Give a run file"))
 ALL = (A, B, C, D, BAD)
-LIST = ("list_folder", "/runs")
+LIST = ("list_folder", "/runs", False)
 
 
 def asked_of(call: Call) -> tuple[Any, ...]:
@@ -344,3 +344,45 @@ def test_opening_shows_the_first_selected(desk: Desk) -> None:
     desk.select(B, A)
     desk.runs.open_selected()
     assert desk.opened == [B.path]
+
+
+def test_the_trash_is_shown_and_runs_come_back_from_it(desk: Desk) -> None:
+    desk.select(A)
+    desk.runs.show_trash(True)
+    assert (desk.runs.state.rows, desk.runs.state.is_listed, desk.runs.state.selected) == ((), False, ())
+    gone = replace(A, path="/runs/.trash/a.h5")
+    desk.answer("list_folder", (gone,))
+    assert desk.tasks[-1] == ("list_folder", "/runs", True)
+    desk.select(gone)
+    assert desk.runs.state.metadata is None, "nothing is edited in the trash"
+    desk.runs.trash()
+    desk.runs.analyse(reanalyse=True)
+    assert not desk.runs.open_export()
+    assert desk.analyst.calls == []
+    desk.runs.restore()
+    desk.answer("restore_from_trash", BatchOutcome(("/runs/a.h5",)))
+    assert desk.runs.state.message.text == "Brought back a"
+    assert desk.runs.state.undo_text == "return of a from the trash"
+    desk.runs.undo()
+    assert desk.tasks[-1] == ("move_to_trash", ("/runs/a.h5",))
+
+
+def test_emptying_the_trash_deletes_all_of_it_whatever_is_filtered(desk: Desk) -> None:
+    desk.runs.empty_trash()
+    assert desk.tasks == [], "only while it is shown"
+    desk.runs.show_trash(True)
+    desk.answer("list_folder", (replace(A, path="/runs/.trash/a.h5"), replace(C, path="/runs/.trash/c.h5")))
+    desk.runs.set_filter(RunFilter(series="2SSM1"))
+    desk.runs.empty_trash()
+    assert desk.tasks[-1] == ("delete_from_trash", ("/runs/.trash/a.h5", "/runs/.trash/c.h5"))
+
+
+def test_a_listing_of_another_place_than_the_one_shown_is_dropped(desk: Desk) -> None:
+    desk.runs.refresh()
+    desk.runs.show_trash(True)
+    desk.answer("list_folder", ALL)
+    assert (desk.runs.state.rows, desk.runs.state.is_listed) == ((), False)
+    assert desk.tasks[-1] == ("list_folder", "/runs", True)
+    desk.runs.show_trash(False)
+    desk.runs.choose_folder("/elsewhere")
+    assert desk.runs.state.folder == "/elsewhere"

@@ -2,7 +2,17 @@
 
 import pytest
 
-from app.presenters.record.next_runs import format_plan, next_series, parse_plan, plan_progress, run_text
+from app.presenters.record.next_runs import (
+    format_plan,
+    next_series,
+    parse_plan,
+    plan_progress,
+    plan_with_added,
+    plan_with_moved,
+    plan_with_repeats,
+    plan_without,
+    run_text,
+)
 from app.runs.next_tests import PlannedSeries
 from config.files import published_table
 
@@ -35,6 +45,16 @@ def test_a_star_stands_for_every_series_it_fits() -> None:
 def test_what_is_no_plan_is_said(text: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         parse_plan(text, ALL)
+
+
+def test_a_plan_is_edited_row_by_row() -> None:
+    progress = plan_progress(parse_plan("1FFM0 x3, 1FFM1 x10, 1FFM2 x2", ALL), {})
+    assert plan_with_repeats(progress, 1, " 4 ") == "1FFM0 x3, 1FFM1 x4, 1FFM2 x2"
+    assert plan_with_moved(progress, 2, -2) == "1FFM2 x2, 1FFM0 x3, 1FFM1 x10"
+    assert plan_with_moved(progress, 0, 1) == "1FFM1 x10, 1FFM0 x3, 1FFM2 x2"
+    assert plan_without(progress, {0, 2}) == "1FFM1 x10"
+    assert plan_with_added(progress, "2SS*") == "1FFM0 x3, 1FFM1 x10, 1FFM2 x2, 2SS*"
+    assert plan_with_added((), " 2SSM0 ") == "2SSM0"
 
 
 def test_dots_tell_what_is_done_and_figures_where_there_are_many() -> None:

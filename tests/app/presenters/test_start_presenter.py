@@ -4,7 +4,9 @@ import pytest
 
 from app.acquisition.messages import PortSettings
 from app.presenters.navigator import ConnectForm
-from app.presenters.start_screen import PortChoice, StartPresenter, StartState, port_settings
+from app.presenters.recent import RecentItems
+from app.presenters.start_screen import PortChoice, StartPresenter, StartState, connect_form, port_settings
+from config.schema import RecentDevice, RecentUse
 from drivers.driver import DeviceDriver
 
 
@@ -97,7 +99,7 @@ def test_a_series_that_does_not_exist_is_not_chosen(presenter: StartPresenter) -
 
 def test_ports_are_looked_for_when_asked(presenter: StartPresenter) -> None:
     assert presenter.state.ports == ()
-    presenter.refresh_ports()
+    presenter.refresh()
     assert presenter.state.ports == (PortChoice("COM7", "FT232R"),)
 
 
@@ -119,3 +121,60 @@ def test_parity_own_settings_and_a_second_port_reach_the_device() -> None:
     )
     with pytest.raises(ValueError, match="Device setting 'unit' is no KEY=VALUE"):
         port_settings(ConnectForm("COM7", "modbus", settings="map=dat1400 unit"))
+
+
+LAST = RecentDevice("GSV-8", "COM7", "gsv", "57600", rate_hz="1000.5", usb="USB 0403:6001 A9")
+
+
+def start_again(doors: FakeDoors, ports: tuple[PortChoice, ...]) -> StartPresenter:
+    """Start of a window after one in which `LAST` was connected."""
+    state = StartState(all_series=(), series="", form=ConnectForm(protocol="csv"))
+    return StartPresenter(state, doors, lambda: ports, RecentItems(RecentUse(LAST, ("/runs/a.h5",))))
+
+
+def test_the_last_amplifier_is_one_click_away_and_fills_the_form(doors: FakeDoors) -> None:
+    presenter = start_again(doors, (PortChoice("COM7", usb=LAST.usb),))
+    assert presenter.state.last_device == "GSV-8 on COM7"
+    assert presenter.state.form == ConnectForm("COM7", "gsv", "57600", "1000.5")
+    assert presenter.state.runs == ("/runs/a.h5",)
+    presenter.connect_last()
+    presenter.open_run("/runs/a.h5")
+    assert doors.opened == [PortSettings("COM7", "gsv", 57600, "N", 1, 1000.5), "/runs/a.h5"]
+
+
+@pytest.mark.parametrize(
+    ("ports", "url"),
+    [
+        ((PortChoice("COM7", usb="USB 2341:0043"), PortChoice("COM9", usb=LAST.usb)), "COM9"),
+        ((PortChoice("COM8", usb=LAST.usb), PortChoice("COM9", usb=LAST.usb)), "COM7"),
+        ((PortChoice("COM9"),), "COM7"),
+    ],
+)
+def test_its_adapter_is_found_under_another_name_where_there_is_only_one(
+    doors: FakeDoors, ports: tuple[PortChoice, ...], url: str
+) -> None:
+    start_again(doors, ports).connect_last()
+    (opened,) = doors.opened
+    assert isinstance(opened, PortSettings)
+    assert opened.url == url
+
+
+def test_without_a_last_amplifier_nothing_is_connected(presenter: StartPresenter, doors: FakeDoors) -> None:
+    presenter.connect_last()
+    assert (presenter.state.last_device, doors.opened) == ("", [])
+
+
+def test_a_connected_amplifier_becomes_the_last_one(doors: FakeDoors) -> None:
+    saved: list[RecentUse] = []
+    state = StartState(all_series=(), series="")
+    ports = (PortChoice("COM7", usb=LAST.usb),)
+    presenter = StartPresenter(state, doors, lambda: ports, RecentItems(save=saved.append))
+    presenter.refresh()
+    presenter.remember_device("GSV-8", PortSettings("COM7", "gsv", 57600, rate_hz=1000.5))
+    assert saved == [RecentUse(LAST)]
+    assert presenter.state.last_device == "GSV-8 on COM7"
+
+
+def test_settings_of_a_port_and_its_form_say_the_same() -> None:
+    port = PortSettings("COM7", "modbus", 9600, "E", 2, 0.1, {"map": "dat1400", "unit": "2"}, "COM8")
+    assert port_settings(connect_form(port)) == port

@@ -33,13 +33,14 @@ from app.presenters.connection import Connection
 from app.presenters.device_status import DeviceMonitor
 from app.presenters.error_reports import ErrorReporter, error_report
 from app.presenters.navigator import ConnectForm
+from app.presenters.recent import RecentItems
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.presenters.settings_screen import PersonalSettings
 from app.presenters.start_screen import StartState
 from app.presenters.window import WindowContext, WindowPresenter
 from config.files import load_gauges
-from config.schema import ConfigError, Settings
+from config.schema import ConfigError, RecentDevice, RecentUse, Settings
 
 NOON = datetime.datetime(2026, 2, 1, 12, tzinfo=datetime.UTC)
 
@@ -47,7 +48,8 @@ NOON = datetime.datetime(2026, 2, 1, 12, tzinfo=datetime.UTC)
 class Desk:
     """A window presenter with everything around it."""
 
-    def __init__(self, personal: PersonalSettings | None = None) -> None:
+    def __init__(self, personal: PersonalSettings | None = None, recent: RecentItems | None = None) -> None:
+        self.recent = recent or RecentItems()
         self.launcher = FakeLauncher()
         self.worker = FakeWorker()
         self.now_s = 0.0
@@ -59,7 +61,7 @@ class Desk:
             self.session,
             self.worker,  # type: ignore[arg-type]
             FakePool(),
-            WindowContext(bench(), start, personal or PersonalSettings()),
+            WindowContext(bench(), start, personal or PersonalSettings(), recent=self.recent),
             self.errors,
         )
 
@@ -450,3 +452,60 @@ def test_the_question_of_closing_leaves_with_the_recording(desk: Desk) -> None:
     desk.play(END_S + 0.1)
     assert desk.window.state.notice is None
     assert desk.window.may_close()
+
+
+def test_an_amplifier_is_remembered_once_it_is_connected_and_the_simulated_stand_never(desk: Desk) -> None:
+    desk.window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    assert desk.recent.device is None
+    desk.window.open_port(PortSettings("COM7", "csv"))
+    assert desk.recent.device is None
+    desk.tick_until_connected()
+    assert desk.recent.device == RecentDevice("Slipstand simulator", "COM7", "csv")
+    desk.window.open_simulated("1FFM0")
+    desk.tick_until_connected()
+    assert desk.window.start.state.last_device == "Slipstand simulator on COM7"
+
+
+@pytest.mark.parametrize("wanted", [False, True])
+def test_the_last_amplifier_is_connected_at_the_start_if_that_is_a_setting(wanted: bool) -> None:
+    recent = RecentItems(RecentUse(RecentDevice("GSV-8", "COM7", "csv")))
+    desk = Desk(PersonalSettings(Settings(connect_at_start=wanted)), recent)
+    desk.window.connect_at_start()
+    if wanted:
+        desk.tick_until_connected()
+    assert [port.url for port in desk.launcher.ports] == (["COM7"] if wanted else [])
+    desk.session.close()
+
+
+def test_recorded_and_opened_runs_are_recent_until_they_are_gone(desk: Desk) -> None:
+    desk.window.open_run("/recordings/a.h5")
+    desk.window.start.start_simulation()
+    desk.tick_until_connected()
+    desk.window.record.dispatch(Action.ARM)
+    desk.play(END_S + 0.1)
+    assert desk.recent.runs == (RUN, "/recordings/a.h5")
+    desk.worker.calls[0].fail("there is no such run")
+    assert desk.recent.runs == (RUN,)
+
+
+def test_the_title_follows_run_device_and_state(desk: Desk) -> None:
+    def title() -> str:
+        desk.window.tick()
+        return desk.window.state.title
+
+    assert title() == "Slipstand"
+    desk.window.start.start_simulation()
+    assert desk.window.record.state.title == ("Simulated stand", "connecting")
+    desk.tick_until_connected()
+    assert title() == "Slipstand simulator \u2013 ready \u2013 Slipstand"
+    desk.window.record.dispatch(Action.ARM)
+    desk.play(3.0)
+    assert title() == "20260112_1FFM0_001 \u2013 Slipstand simulator \u2013 recording: Pull \u2013 Slipstand"
+    desk.play(END_S + 0.1)
+    desk.window.show_screen(Screen.IDENTIFY)
+    assert title() == "20260112_1FFM0_001 \u2013 Slipstand simulator \u2013 ready \u2013 Slipstand"
+    desk.window.open_run("/recordings/other.h5")
+    assert title().startswith("other \u2013 20260112_1FFM0_001 \u2013 ")
+    desk.launcher.engines[-1].say(Reconnecting("COM7 is gone"))
+    assert "device lost" in title()

@@ -23,6 +23,7 @@ from analysis.synthetic import Truth, simulate_record
 from app.presenters.analysed_run import AnalysedRun, Channel, Kinematics, Objective
 from app.presenters.base import Progress
 from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.report import ReportPresenter
 from app.presenters.identify.state import ClassicalRow, Cursor, ManualFit, PlotLine, PlotTab
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
@@ -46,9 +47,10 @@ class Stage:
 
     def __init__(self, theme: Theme, qtbot: QtBot) -> None:
         self.asked = 0
-        self.worker = FakeWorker()
-        self.presenter = IdentifyPresenter(self.worker)  # type: ignore[arg-type]
-        self.screen = IdentifyScreen(theme, self.presenter, self._ask)
+        self.exported: list[str] = []
+        self.worker, self.reports = FakeWorker(), FakeWorker()
+        self.presenter = IdentifyPresenter(self.worker, ReportPresenter(self.reports))  # type: ignore[arg-type]
+        self.screen = IdentifyScreen(theme, self.presenter, self._ask, self.exported.append)
         qtbot.addWidget(self.screen)
         self.screen.resize(1188, 800)
         self.presenter.attach(self.screen)
@@ -478,7 +480,7 @@ def test_the_phase_plane_marks_both_moments_as_points(stage: Stage, qtbot: QtBot
 
 def test_the_keys_of_the_cursors_are_told_once_for_all_tabs(stage: Stage) -> None:
     told = [key.key for key in list_shortcuts(stage.screen)]
-    assert sorted(told) == sorted(["C", "← → A B", "← →", "+ − ← → ↑ ↓ Y Home"])
+    assert sorted(told) == sorted(["C", "Ctrl+E", "Ctrl+P", "← → A B", "← →", "+ − ← → ↑ ↓ Y Home"])
     assert stage.screen._cursors.toolTip().endswith("(C)")
 
 

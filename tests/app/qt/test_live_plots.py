@@ -5,7 +5,8 @@ import pytest
 from PySide6.QtGui import QColor, QImage
 from pytestqt.qtbot import QtBot
 
-from app.presenters.decimated_history import DecimatedHistory
+from analysis.catalogue import MICROMETRE, MILLIMETRE, use_displacement_unit
+from app.presenters.decimated_history import DecimatedHistory, Polyline
 from app.presenters.record.state import Traces
 from app.qt.record.live_plots import LivePlots
 from app.qt.theme import Theme
@@ -43,3 +44,19 @@ def test_many_swings_a_pixel_are_drawn_as_the_band_they_look_like(
     assert band.sum() > 10_000
     # Strokes are softened at their ends, bands are not: one pixel at either edge.
     assert np.abs(band.sum(axis=0) - strokes.sum(axis=0)).max() <= 3
+
+
+def test_axes_titles_and_readouts_are_in_the_unit_of_the_settings(theme: Theme, qtbot: QtBot) -> None:
+    use_displacement_unit(MICROMETRE)
+    try:
+        plots = LivePlots(theme)
+        qtbot.addWidget(plots)
+        line = Polyline(np.array([0.0, 1.0]), np.array([0.0, 12.0]))
+        plots.show_traces(Traces(line, line, span=(0.0, 1.0)))
+        plots._hover(1.0)
+        table = plots._stack.plots[0]
+        assert table.left.tickStrings([12.0], table.left.scale, 1.0) == ["12000"]
+        assert "µm" in table.title.text
+        assert "12000\u202fµm" in table.readout.text
+    finally:
+        use_displacement_unit(MILLIMETRE)

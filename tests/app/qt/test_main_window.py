@@ -28,6 +28,7 @@ from app.presenters.connection import Connection
 from app.presenters.error_reports import ErrorReport, ErrorReporter
 from app.presenters.navigator import ConnectForm
 from app.presenters.notices import NoticeSources
+from app.presenters.recent import RecentItems
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
 from app.presenters.start_screen import PortChoice, StartState
@@ -35,14 +36,21 @@ from app.presenters.window import WindowContext, WindowPresenter
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.widgets.shortcuts import HelpDialog
 from app.qt.window import MainWindow
-from config.schema import WindowLayout
+from config.files import save_stand
+from config.schema import RecentUse, WindowLayout
 from drivers.driver import DeviceDriver
 
 
 class Desk:
     """A window on fakes."""
 
-    def __init__(self, theme: Theme, qtbot: QtBot, place: WindowLayout | None = None) -> None:
+    def __init__(
+        self,
+        theme: Theme,
+        qtbot: QtBot,
+        place: WindowLayout | None = None,
+        recent: RecentUse | None = None,
+    ) -> None:
         self.qtbot = qtbot
         self.faults = ErrorReporter()
         self.unfinished = 0
@@ -67,6 +75,8 @@ class Desk:
                 start,
                 list_ports=lambda: (PortChoice("COM7", "FT232R"),),
                 notices=NoticeSources(lambda: self.unfinished),
+                recent=RecentItems(recent),
+                save_stand=save_stand,
             ),
             self.faults,
         )
@@ -208,12 +218,13 @@ def test_tab_goes_through_the_start_page_in_reading_order(desk: Desk) -> None:
     desk.window.activateWindow()
     desk.button("Try with the simulated stand").setFocus()
     names = []
-    for _ in range(7):
+    for _ in range(8):
         desk.qtbot.keyClick(QApplication.focusWidget(), Qt.Key.Key_Tab)
         focused = QApplication.focusWidget()
         names.append(focused.accessibleName() or focused.text())
     assert names == [
-        "Port", "Protocol", "Baud", "Rate, Hz", "More settings", "Connect my amplifier", "Open a recording"
+        "Find my amplifier", "Port", "Protocol", "Baud", "Rate, Hz", "More settings", "Connect my amplifier",
+        "Open a recording",
     ]  # fmt: skip
 
 

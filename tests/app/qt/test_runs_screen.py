@@ -8,7 +8,7 @@ from looking import clipped_words, plain, visible_words
 from pointing import Hand
 from PySide6.QtCore import QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QTextDocument
-from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QMessageBox, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker
 
@@ -205,6 +205,15 @@ def test_runs_are_analysed_by_key_and_anew_with_shift_and_shown_beside_other_wor
     assert f"Analysing {Path(path).stem}, 1 of 1. Moved {Path(path).stem} to the trash" in said
 
 
+@pytest.mark.parametrize("key", [Qt.Key.Key_Up, Qt.Key.Key_Down])
+def test_an_arrow_selects_the_only_run(stage: Stage, key: Qt.Key) -> None:
+    stage.presenter.refresh()
+    stage.answer("list_folder", RUNS[:1])
+    stage.table.setFocus()
+    stage.qtbot.keyClick(stage.table, key)
+    assert stage.presenter.state.selected == (RUNS[0].path,)
+
+
 def test_a_note_is_kept_on_enter_and_undone_with_a_key(stage: Stage) -> None:
     stage.list_runs()
     stage.click_row(0)
@@ -352,3 +361,36 @@ def test_a_picture_of_the_preview_has_the_names_of_the_runs(stage: Stage) -> Non
         "one, relative displacement, mm",
         "two, relative displacement, mm",
     ]
+
+
+def test_the_trash_is_emptied_after_a_question_alone(stage: Stage) -> None:
+    stage.list_runs()
+    assert not stage.button("Restore").isVisible()
+    stage.qtbot.keyClick(stage.table, Qt.Key.Key_T, Qt.KeyboardModifier.ControlModifier)
+    stage.answer("list_folder", ())
+    assert "The trash of /runs is empty." in visible_words(stage.screen)
+    assert not stage.button("Empty trash…").isEnabled()
+    stage.list_runs()
+    stage.click_row(0)
+    stage.qtbot.keyClick(stage.table, Qt.Key.Key_Insert)
+    assert [call.arguments[1].name for call in stage.calls("change_runs")] == ["restore_from_trash"]
+    for answer, names in (("Cancel", []), ("Delete 6 runs", ["delete_from_trash"])):
+        stage.worker.calls.clear()
+        stage.qtbot.keyClick(stage.button("Empty trash…"), Qt.Key.Key_Space)
+        box = stage.screen.findChildren(QMessageBox)[-1]
+        assert box.text() == "Delete 6 runs for ever?"
+        assert "/runs" in box.informativeText()
+        assert box.defaultButton().text() == box.escapeButton().text() == "Cancel"
+        (button,) = [button for button in box.buttons() if button.text() == answer]
+        stage.qtbot.keyClick(button, Qt.Key.Key_Space)
+        assert not box.isVisible()
+        assert [call.arguments[1].name for call in stage.calls("change_runs")] == names
+
+
+@pytest.mark.parametrize("size", [(932, 600), (1188, 760)], ids=lambda size: f"{size[0]}")
+def test_no_word_of_the_trash_is_cut_off(stage: Stage, size: tuple[int, int]) -> None:
+    stage.screen.resize(*size)
+    stage.presenter.show_trash(True)
+    stage.list_runs()
+    QApplication.processEvents()
+    assert clipped_words(stage.screen) == []

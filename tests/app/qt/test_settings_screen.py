@@ -11,14 +11,19 @@ from pytestqt.qtbot import QtBot
 
 from app.presenters.settings_screen import PersonalSettings, SettingsFile, SettingsPresenter
 from app.qt.settings_screen import SettingsScreen
+from config.files import load_stand
 from config.schema import Settings
 
 
 class Page:
     def __init__(self, qtbot: QtBot) -> None:
         self.qtbot = qtbot
-        files = (SettingsFile("Stand", "/etc/slipstand/stand.toml"),)
-        personal = PersonalSettings(recordings="/recordings", override="SLIPSTAND_RECORDINGS", files=files)
+        self.stand_file = "/etc/slipstand/stand.toml"
+        personal = PersonalSettings(
+            recordings="/recordings",
+            override="SLIPSTAND_RECORDINGS",
+            list_files=lambda: (SettingsFile("Stand", self.stand_file),),
+        )
         self.presenter = SettingsPresenter(personal, lambda _: None)
         self.view = SettingsScreen(self.presenter)
         qtbot.addWidget(self.view)
@@ -101,6 +106,19 @@ def test_files_are_opened_by_the_system(page: Page, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
     page.qtbot.mouseClick(page.find(QPushButton, "Open Stand"), Qt.MouseButton.LeftButton)
     assert [url.toLocalFile() for url in opened] == ["/etc/slipstand/stand.toml"]
+
+
+def test_another_file_of_the_stand_is_the_one_that_is_opened(
+    page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page.stand_file = "/home/me/stand.toml"
+    page.presenter.on_stand(load_stand())
+    page.qtbot.wait(1)
+    opened: list[str] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", lambda url: opened.append(url.toLocalFile()))
+    page.qtbot.mouseClick(page.find(QPushButton, "Open Stand"), Qt.MouseButton.LeftButton)
+    assert opened == ["/home/me/stand.toml"]
+    assert "/home/me/stand.toml" in visible_words(page.view).replace("\u200b", "")
 
 
 @pytest.mark.parametrize("size", [(932, 600), (1188, 760), (1828, 1040)])

@@ -35,6 +35,7 @@ PATIENCE_MS = 60_000
 @pytest.fixture
 def presenter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WindowPresenter:
     monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path))
+    monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path / "config"))
     return make_window_presenter(QUICK)
 
 

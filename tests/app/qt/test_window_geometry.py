@@ -9,6 +9,7 @@ from stage import FakeWorker, analysed
 from test_main_window import Desk
 
 from app.presenters.identify.presenter import IdentifyPresenter
+from app.presenters.identify.report import ReportPresenter
 from app.presenters.runs.state import Column
 from app.presenters.screens import Screen
 from app.qt.identify.screen import IdentifyScreen
@@ -156,7 +157,7 @@ def test_a_splitter_that_was_not_shown_keeps_what_it_had(window: QMainWindow) ->
 
 def test_the_column_of_identify_is_as_wide_as_it_was_left(window: QMainWindow, theme: Theme) -> None:
     def shown(place: WindowLayout) -> tuple[WindowLayout, QSplitter]:
-        presenter = IdentifyPresenter(FakeWorker())
+        presenter = IdentifyPresenter(FakeWorker(), ReportPresenter(FakeWorker()))
         screen = IdentifyScreen(theme, presenter, lambda: None)
         presenter.attach(screen)
         window.setCentralWidget(screen)

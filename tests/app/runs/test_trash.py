@@ -1,4 +1,4 @@
-"""The trash: nothing is deleted, nothing is overwritten."""
+"""The trash: nothing is overwritten, and nothing is deleted that is not in it."""
 
 import errno
 
@@ -7,8 +7,8 @@ from runs_kit import ENDING, block, small_run
 
 from app.runs import file_operations as trash_module
 from app.runs.errors import BeingRecordedError, RunNotFoundError, UnsuitableRunError
-from app.runs.file_operations import list_trash, move_to_trash, restore_from_trash
-from app.runs.listing import find_run_files
+from app.runs.file_operations import delete_from_trash, list_trash, move_to_trash, restore_from_trash
+from app.runs.listing import find_run_files, list_runs
 from app.runs.reader import open_run
 from app.runs.writer import create_run
 
@@ -79,3 +79,28 @@ def test_what_is_no_run_stays_where_it_is(tmp_path, metadata):
 def test_the_trash_of_a_folder_that_is_not_there(tmp_path):
     with pytest.raises(RunNotFoundError, match="no such folder"):
         list_trash(tmp_path / "absent")
+
+
+def test_only_a_run_in_the_trash_is_deleted(tmp_path, metadata):
+    path = tmp_path / "run.h5"
+    small_run(path, metadata)
+    with pytest.raises(UnsuitableRunError, match="not in a trash"):
+        delete_from_trash(path)
+    assert path.exists()
+    lies = move_to_trash(path)
+    (lies.parent / "notes.txt").write_text("kept")
+    delete_from_trash(lies)
+    assert [kept.name for kept in lies.parent.iterdir()] == ["notes.txt"]
+    with pytest.raises(RunNotFoundError):
+        delete_from_trash(lies)
+
+
+def test_the_runs_in_all_trashes_of_a_folder_are_listed(tmp_path, metadata):
+    (tmp_path / "below").mkdir()
+    for path in (tmp_path / "a.h5", tmp_path / "b.h5", tmp_path / "below" / "c.h5"):
+        small_run(path, metadata)
+    assert list_runs(tmp_path, in_trash=True) == []
+    lie = {str(move_to_trash(tmp_path / "a.h5")), str(move_to_trash(tmp_path / "below" / "c.h5"))}
+    for _ in ("read", "indexed"):
+        assert {run.path for run in list_runs(tmp_path, in_trash=True)} == lie
+        assert [run.path for run in list_runs(tmp_path)] == [str(tmp_path / "b.h5")]

@@ -1,0 +1,110 @@
+"""The keyboard rules of the window: Enter presses what has the focus, and the focus never moves by itself."""
+
+from collections.abc import Iterator
+
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QToolButton, QWidget
+from pytestqt.qtbot import QtBot
+from stage import END_S, analysed
+from test_main_window import Desk
+
+from app.presenters.base import Notice
+from app.presenters.record.state import MoveToTrash
+from app.presenters.screens import Screen
+from app.qt.theme import Theme
+
+
+@pytest.fixture
+def desk(theme: Theme, qtbot: QtBot) -> Iterator[Desk]:
+    made = Desk(theme, qtbot)
+    made.window.activateWindow()
+    yield made
+    made.window.close()
+
+
+def focused() -> QWidget:
+    found = QApplication.focusWidget()
+    assert found is not None
+    return found
+
+
+def press(desk: Desk, key: Qt.Key) -> None:
+    desk.qtbot.keyClick(focused(), key)
+
+
+def record(desk: Desk) -> None:
+    """Connect the simulated stand, and record a run up to its result."""
+    desk.click("Try with the simulated stand")
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    press(desk, Qt.Key.Key_A)
+    desk.launcher.engines[0].play(END_S + 0.1)
+    desk.qtbot.waitUntil(lambda: bool(desk.worker.calls), timeout=5000)
+    desk.worker.calls[-1].done(analysed())
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.decision is not None, timeout=5000)
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Enter])
+@pytest.mark.parametrize("screen", Screen)
+def test_enter_presses_each_button_of_each_screen(desk: Desk, screen: Screen, key: Qt.Key) -> None:
+    desk.presenter.show_screen(screen)
+    QApplication.processEvents()
+    buttons: list[QPushButton | QToolButton] = [
+        *desk.window.findChildren(QPushButton),
+        *desk.window.findChildren(QToolButton),
+    ]
+    pressed: list[QWidget] = []
+    for button in buttons:
+        if button.isVisible() and button.isEnabled() and button.menu() is None:
+            button.blockSignals(True)  # what a button does is tested elsewhere
+            button.setFocus()
+            pressed.clear()
+            was_checked = button.isChecked()
+            button.setCheckable(True)
+            button.setAutoExclusive(False)
+            button.setChecked(False)
+            desk.qtbot.keyClick(focused(), key)
+            assert button.isChecked(), f"Enter did not press {button.text()!r}"
+            button.setChecked(was_checked)
+
+
+@pytest.mark.parametrize("screen", Screen)
+def test_a_screen_that_opens_has_the_focus_on_no_button_and_no_field(desk: Desk, screen: Screen) -> None:
+    for other in Screen:
+        if other is not screen:
+            desk.presenter.show_screen(other)
+            desk.presenter.show_screen(screen)
+            assert not isinstance(focused(), QPushButton | QToolButton | QLineEdit)
+
+
+def test_keys_of_record_work_after_a_notice_was_dismissed(desk: Desk) -> None:
+    record(desk)
+    desk.presenter._update(notice=Notice("Something came up"))
+    desk.click("Dismiss")
+    press(desk, Qt.Key.Key_D)
+    files = desk.presenter.record._files
+    assert any(isinstance(call.arguments[0], MoveToTrash) for call in files.calls)  # type: ignore[attr-defined]
+
+
+def test_the_focus_does_not_pass_on_from_a_button_that_is_disabled_or_hidden(desk: Desk) -> None:
+    desk.presenter.show_screen(Screen.RECORD)
+    for vanish in (QWidget.hide, lambda button: button.setEnabled(False)):
+        button = desk.button("Plan")
+        button.setFocus()
+        vanish(button)
+        assert focused() is desk.window.home()
+        button.setEnabled(True)
+        button.show()
+
+
+def test_neither_arm_nor_stop_has_the_focus_while_a_run_is_recorded(desk: Desk) -> None:
+    desk.click("Try with the simulated stand")
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.button("Arm   A").setFocus()
+    press(desk, Qt.Key.Key_Return)
+    desk.launcher.engines[0].play(3.0)
+    desk.qtbot.waitUntil(lambda: desk.button("Stop   Esc").isEnabled(), timeout=5000)
+    assert focused() is desk.window.home()
+    press(desk, Qt.Key.Key_Space)
+    press(desk, Qt.Key.Key_Return)
+    assert desk.presenter.record.is_recording
