@@ -1,7 +1,6 @@
 """Shared by the tests of the engine: a simulated stand, a connection, and waiting."""
 
 import contextlib
-import os
 import time
 from pathlib import Path
 
@@ -86,21 +85,6 @@ def record_run(
     """Record one run and wait for its end."""
     with contextlib.closing(record_runs(port, run, stand_file, gauges_file, on_event)) as runs:
         return next(runs)
-
-
-def gone(process_id: int, patience_s: float = 20.0) -> bool:
-    """Wait until a process has ended; one that waits to be collected has."""
-    end = time.monotonic() + patience_s
-    while time.monotonic() < end:
-        stat = Path(f"/proc/{process_id}/stat")
-        try:
-            os.kill(process_id, 0)
-            if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] == "Z":
-                return True
-        except (ProcessLookupError, FileNotFoundError):  # it may end between two calls
-            return True
-        time.sleep(0.02)
-    return False
 
 
 def closed_run(folder: Path, patience_s: float = 20.0) -> Run:

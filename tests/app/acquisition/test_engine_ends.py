@@ -11,7 +11,6 @@ from engine_kit import (
     FILES,
     closed_run,
     connect,
-    gone,
     port_of,
     run_in,
     stand,
@@ -37,6 +36,7 @@ from app.acquisition.messages import (
 from app.runs.reader import open_run
 from app.runs.unattended import read_notes
 from app.simulated_stand.options import Gesture
+from tests.drills.processes import gone
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 

@@ -53,9 +53,10 @@ def test_all_of_it_moves_wherever_the_write_failed(tmp_path, room, code):
     assert list(path.parent.iterdir()) == []
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows renames no file that is open")
 def test_a_journal_that_can_no_longer_be_read_stays_and_the_rest_goes_elsewhere(tmp_path, monkeypatch):
     path, refuge = tmp_path / "share" / "run.journal", tmp_path / "refuge"
-    file = failing(path, [refuge], room=4 * 50, code=errno.ESTALE if sys.platform != "win32" else errno.EIO)
+    file = failing(path, [refuge], room=4 * 50, code=errno.ESTALE)
     for number, data in enumerate(READS[:4]):
         file.append(encode_record(data, number))
     monkeypatch.setattr("app.acquisition.journal.file._PIECE_BYTES", 60)

@@ -8,7 +8,6 @@ import time
 
 import numpy as np
 import pytest
-from engine_kit import gone
 
 from analysis.synthetic import Truth, simulate_readings
 from app.acquisition.live_client import DIED_NOTE, LiveIdentifier, spawn_live
@@ -19,6 +18,7 @@ from app.runs.metadata import create_metadata
 from config.files import load_gauges, load_stand
 from drivers.clock import TimeBase
 from drivers.samples import SampleStatus
+from tests.drills.processes import gone
 
 PATIENCE_S = 300.0
 """Compiling anew on a busy machine takes more than a minute."""

@@ -7,10 +7,11 @@ import time
 from pathlib import Path
 
 import pytest
-from engine_kit import FILES, connect, gone, port_of, record_run, run_in, stand, until
+from engine_kit import FILES, connect, port_of, record_run, run_in, stand, until
 
 from app.acquisition.live_client import DIED_NOTE
 from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged
+from tests.drills.processes import gone
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
 
