@@ -156,6 +156,7 @@ class WindowsEnvironment:
         shutil.rmtree(target, ignore_errors=True)
         _check([str(self.folder / "tools" / "bin" / "uv"), "pip", "install", "--quiet", "--python-platform",
                 "x86_64-pc-windows-msvc", "--python-version", _PYTHON_VERSION, "--target", str(target),
+                "--link-mode", "copy",  # a file is changed below, and not that of uv's cache
                 "--require-hashes", *_index(), "-r", str(PROJECT / "requirements.lock")])  # fmt: skip
         port = target / "serial" / "serialwin32.py"
         source = port.read_text(encoding="utf-8")
