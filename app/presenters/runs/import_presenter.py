@@ -182,7 +182,8 @@ class ImportPresenter(Presenter[ImportState]):
             form = {**form, **{name: self._before.form[name] for name in CARRIED_LINE_FIELDS}}
         self._reading = self._columns = self._surveyed = self._previewed = None
         self._is_stale, self._is_new = False, True
-        self._set_state(ImportState(path=path, pending=len(self._files), form=form))
+        overlay = _NOTHING_DRAWN if path else Overlay()
+        self._set_state(ImportState(path=path, pending=len(self._files), form=form, overlay=overlay))
         if path:
             self._read(is_survey=True)
 

@@ -28,6 +28,7 @@ _DATE = re.compile(r"^(date|datum|дата)\b", re.IGNORECASE)
 _GROUPS = re.compile(r"^(?:[^\s/]+/)+(?=\S)|^\w+\.(?=\w)")
 """Groups of HDF5 and TDMS, and structs of MATLAB, before a name."""
 _LINES_SHOWN, _LINE_CHARACTERS = 60, 400
+_UNPACKED_SHARE = 0.1  # of the time of a look into a file
 _TIMES, _LENGTHS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}, {"m": 1.0, "mm": 1e-3, "um": 1e-6}
 
 
@@ -90,8 +91,8 @@ def preview_file(
     path: Path, given: ParseOptions | None = None, report: ReportShare = lambda _: None
 ) -> FilePreview:
     """Look into a file that `import_foreign_file` can read. Raises ImportFileError, ExtraMissingError."""
-    with unpacked(path, part_of(report, 0.0, 0.5)) as plain:
-        return _preview(plain, given or ParseOptions(), part_of(report, 0.5, 1.0))
+    with unpacked(path, part_of(report, 0.0, _UNPACKED_SHARE)) as plain:
+        return _preview(plain, given or ParseOptions(), part_of(report, _UNPACKED_SHARE, 1.0))
 
 
 def survey_file(path: Path, given: ParseOptions, report: ReportShare = lambda _: None) -> FileSurvey:
@@ -99,13 +100,13 @@ def survey_file(path: Path, given: ParseOptions, report: ReportShare = lambda _:
 
     Raises ImportFileError only for a file that cannot be opened.
     """
-    with unpacked(path, part_of(report, 0.0, 0.5)) as plain:
+    with unpacked(path, part_of(report, 0.0, _UNPACKED_SHARE)) as plain:
         survey = FileSurvey()
         try:
             if is_csv(plain):
                 text = open_text(plain, given.encoding)
                 survey = FileSurvey(text.first_lines(_LINES_SHOWN, _LINE_CHARACTERS), text.encoding)
-            return replace(survey, preview=_preview(plain, given, part_of(report, 0.5, 1.0)))
+            return replace(survey, preview=_preview(plain, given, part_of(report, _UNPACKED_SHARE, 1.0)))
         except ImportFileError as error:
             return replace(survey, fault=error.message)
 
