@@ -50,7 +50,7 @@ class FilePreview:
     """As `FileLayout` asks for them: by name, by number where a name is missing or comes twice."""
     titles: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    """Cells of the first lines of a text; none of other files."""
+    """Cells of the first rows; none of a file without rows."""
     options: ParseOptions
     time: str = ""
     """Which columns they are likely to be; `second` is empty where there is none, `time` too where the file

@@ -1,6 +1,7 @@
 """MATLAB files: up to version 7 by scipy, of version 7.3 by h5py."""
 
 import functools
+import io
 import math
 import struct
 import zlib
@@ -22,7 +23,7 @@ _HEADER_BYTES = 128
 _COMPRESSED = 15  # type of an element (MathWorks, "MAT-File Format", table 1-1)
 _PIECE_BYTES = 1 << 16
 _STRUCT_BYTES = 1 << 26
-"""Unpacked: names and lengths of the fields of a struct are known when all of it is loaded."""
+"""Of all structs, unpacked: the fields of a struct are known only when all of it is loaded."""
 _NUMBERS = (
     "double",
     "single",
@@ -46,15 +47,17 @@ def open_table(path: Path, layout: FileLayout, _report: ReportShare) -> Table:
             return open_matlab(path)
     columns: list[_Column] = []
     load = functools.lru_cache(maxsize=1)(partial(_load, path))  # columns of a matrix come one by one
+    left_bytes = _STRUCT_BYTES
     for number, (name, shape, kind) in enumerate(whosmat(path)):
-        if kind in _NUMBERS:
+        if kind in _NUMBERS and not name.startswith("__"):
             columns += _columns(name, shape, partial(load, name, shape))
-        elif kind == "struct" and not _is_too_large(path, number):
+        elif kind == "struct" and (size_bytes := _unpacked_bytes(path, number, left_bytes)) <= left_bytes:
+            left_bytes -= size_bytes
             for field, values in _fields(name, load(name, shape)):
                 columns += _columns(field, values.shape, partial(np.asarray, values))
         elif kind == "struct" and any(wanted.startswith(f"{name}.") for _, wanted in layout.wanted):
             raise ImportFileError(
-                "{path}: the struct {name} takes more than {megabytes} MB. Save its fields as variables",
+                "{path}: structs up to {name} take more than {megabytes} MB. Save its fields as variables",
                 path=path,
                 name=name,
                 megabytes=_STRUCT_BYTES >> 20,
@@ -97,22 +100,19 @@ def _load(path: Path, name: str, shape: tuple[int, ...]) -> Any:
     return loadmat(path, variable_names=[name], simplify_cells=True)[name]
 
 
-def _is_too_large(path: Path, number: int) -> bool:
-    """Tell whether a variable of a file of version 5, counted from 0, unpacks to more than a struct may."""
+def _unpacked_bytes(path: Path, number: int, most: int) -> int:
+    """Size of a variable, counted from 0, of a file of version 5; some size above `most` if it is larger."""
     with path.open("rb") as file:
-        order = "<" if file.read(_HEADER_BYTES).endswith(b"IM") else ">"
+        tag = struct.Struct("<II" if file.read(_HEADER_BYTES).endswith(b"IM") else ">II")
         for _ in range(number):
-            _, size_bytes = struct.unpack(f"{order}II", file.read(8))
-            file.seek(size_bytes, 1)
-        kind, size_bytes = struct.unpack(f"{order}II", file.read(8))
+            _, size_bytes = tag.unpack(file.read(tag.size))
+            file.seek(size_bytes, io.SEEK_CUR)
+        kind, size_bytes = tag.unpack(file.read(tag.size))
         if kind != _COMPRESSED:
-            return bool(size_bytes > _STRUCT_BYTES)
+            return int(size_bytes)
         unpacker, unpacked = zlib.decompressobj(), 0
-        while (
-            size_bytes > 0
-            and unpacked <= _STRUCT_BYTES
-            and (data := file.read(min(size_bytes, _PIECE_BYTES)))
-        ):
-            size_bytes -= len(data)
+        while size_bytes > 0 and unpacked <= most:
+            data = file.read(min(size_bytes, _PIECE_BYTES))
             unpacked += len(unpacker.decompress(data))
-    return unpacked > _STRUCT_BYTES
+            size_bytes -= len(data) or size_bytes
+    return unpacked

@@ -47,20 +47,23 @@ def test_cells_and_large_structs_of_matlab_are_not_loaded(tmp_path, monkeypatch)
     content = {
         "cells": np.array([np.zeros(5), "a"], object),
         "S": {"t": np.arange(100_000) * 1.0, "u1": np.arange(100_000) * 2.0},
+        "T": {"v": np.arange(100_000) * 3.0},
         "both": np.column_stack([np.arange(ROWS), np.arange(ROWS) * 3.0]),
     }
     of_struct = ImportPlan(FileLayout("S.t", "S.u1"))
     for compressed in (False, True):
         savemat(path, content, do_compression=compressed)
+        monkeypatch.setattr(matlab, "_STRUCT_BYTES", 3 << 20)
+        assert preview_file(path).columns == ("S.t", "S.u1", "T.v", "both:0", "both:1")
         monkeypatch.setattr(matlab, "_STRUCT_BYTES", 2 << 20)
         assert preview_file(path).columns == ("S.t", "S.u1", "both:0", "both:1")
         assert np.array_equal(read_record(path, of_struct).cells[0], 2.0 * np.arange(100_000))
         monkeypatch.setattr(matlab, "_STRUCT_BYTES", 1 << 20)
-        assert preview_file(path).columns == ("both:0", "both:1")
+        assert preview_file(path).columns == ("T.v", "both:0", "both:1")
         by_matrix = read_record(path, ImportPlan(FileLayout("both:0", "both:1")))
         assert list(by_matrix.cells[0]) == [3.0 * row for row in range(ROWS)]
         assert fault_of(path, of_struct) == (
-            "workspace.mat: the struct S takes more than 1 MB. Save its fields as variables"
+            "workspace.mat: structs up to S take more than 1 MB. Save its fields as variables"
         )
 
 
