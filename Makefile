@@ -138,7 +138,7 @@ screenshots: setup
 	$(BIN)/python -m tools.screenshots docs/screenshots
 
 study: setup
-	@for study in coverage wrong_models garbage one_mass campaign plan real_stand; do \
+	@for study in coverage wrong_models garbage one_mass campaign plan real_stand live; do \
 		echo "== benchmarks.study_$$study"; $(BIN)/python -m benchmarks.study_$$study || exit 1; done
 
 lock: setup

@@ -242,13 +242,16 @@ class StandSearch:
         return self._stand_fit(window, trials[0], trials)
 
     def _stand_fit(self, window: FitProblem, best: _Trial, others: list[_Trial]) -> StandFit:
-        """The best trial without needless effects, fitted to all readings, and what the others say of f_d."""
+        """The best trial without needless effects, fitted to all readings, and what the others say of f_d.
+
+        `best` is one of the `others`, too.
+        """
         alike = self._in_two_steps(window, best)
         trial, evidence = self._without_needless(window, min((best, *alike), key=_bic_of))
         friction = self._friction(window, trial.model, trial.point)
         rivals = [
             (other.bic - trial.bic, self._friction(window, other.model, other.point) - friction)
-            for other in (best, *others, *alike)
+            for other in (*others, *alike)
             if other.names != trial.names and other.bic < trial.bic + _RIVAL_BIC
         ]
         fit = self._finish(trial)
@@ -291,7 +294,8 @@ class StandSearch:
     def _in_two_steps(self, window: FitProblem, trial: _Trial) -> list[_Trial]:
         """A trial of a slow release behind a filter, with a release in two steps in place of the filter.
 
-        Both round the start of the motion alike, so that a search that met the filter first ends there.
+        None of any other trial. Both round the start of the motion alike, so that a search that met the
+        filter first ends there.
         """
         if not {_RAMP.name, _FILTER.name} <= trial.names:
             return []
@@ -306,7 +310,7 @@ class StandSearch:
             point[_PLACES[StandParameter.RELEASE_RAMP]] *= ramp
             point[_PLACES[StandParameter.RELEASE_STEP]] = step
             found.append(self._trial(window, effects, point))
-        return found
+        return [min(found, key=_bic_of)]
 
     def _trial(
         self, window: FitProblem, effects: tuple[StandEffect, ...], point: Floats, steps: int = _STEPS_WINDOW
