@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from campaign_stage import ALL_SERIES, FOLDER, found, path_of, runs_with_a_mode
 from looking import clipped_words, visible_words
+from pointing import Hand
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
@@ -122,6 +123,27 @@ def test_simulated_runs_are_named_and_chosen_by_a_switch(stage: Stage) -> None:
     stage.gathered(replace(found(), simulated_count=4, is_mixed=True, simulated_counts=True))
     assert "SIMULATED and recorded" in stage.words()
     assert switch.isChecked()
+
+
+def test_the_figure_is_zoomed_reset_and_saved_as_numbers(stage: Stage) -> None:
+    stage.gathered()
+    stack = stage.screen._plot._stack
+    hand, whole = Hand(stack), stack.plots[0].view.viewRange()
+    hand.wheel(3, hand.place(0.5, 0.5), Qt.KeyboardModifier.ControlModifier)
+    assert stack.plots[0].view.viewRange()[1] != whole[1]
+    hand.move(hand.place(0.5, 0.5))
+    assert stack.plots[0].readout.text
+    hand.double_click(hand.place(0.5, 0.5))
+    assert stack.plots[0].view.viewRange() == whole
+    columns = stack.table()
+    assert [column.title for column in columns] == [
+        f"{symbol}{end}"
+        for symbol in ("f_s", "f_d")
+        for end in ("", ", lower end of 95 %", ", upper end of 95 %")
+    ]
+    (bars, *_) = stage.presenter.state.summary.contacts
+    assert bars.dynamic is not None
+    assert (columns[3].x[0], columns[3].y[0]) == (bars.contact, bars.dynamic.value)
 
 
 def test_effects_of_the_stand_have_a_block(stage: Stage) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from looking import clipped_words, visible_words
+from pointing import Hand
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
@@ -146,6 +147,25 @@ def test_health_says_how_to_get_it_then_shows_it(stage: Stage) -> None:
     assert "Check shield and plugs" in stage.words()
     drawn = stage.screen._health._spectrum._curves[0].getData()
     assert len(drawn[0]) == 499
+
+
+def test_the_spectrum_is_zoomed_with_numbers_at_its_axes_and_saved_in_its_units(stage: Stage) -> None:
+    stage.fill()
+    QApplication.processEvents()
+    spectrum = stage.screen._health._spectrum
+    hand = Hand(spectrum)
+    for _ in range(12):
+        hand.wheel(1, hand.place(0.5, 0.5))
+    (plot,) = spectrum.plots
+    low, high = plot.view.viewRange()[0]
+    marks = [value for value, _ in plot.bottom._tickLevels[0]]
+    assert len(marks) >= 2
+    assert all(low <= mark <= high for mark in marks)
+    hand.move(hand.place(0.5, 0.5))
+    assert "Hz" in plot.readout.text
+    (one, _) = spectrum.table()
+    assert (one.x_title, one.title) == ("frequency, Hz", "gauge 1, noise, µm/√Hz")
+    assert 10.0**low <= one.x[0] < one.x[-1] <= 10.0**high
 
 
 def test_keys_reach_every_tab_and_the_ports(stage: Stage) -> None:
