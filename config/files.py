@@ -225,7 +225,7 @@ def load_window_layout() -> schema.WindowLayout:
 def save_window_layout(place: schema.WindowLayout, day: datetime.date) -> Path | None:
     """Keep how the window is left, as `save_settings` keeps settings. Raises ConfigError."""
     values = msgspec.structs.asdict(place)
-    for key in ("widths", "sorted_by"):
+    for key in ("widths", "sorted_by", "columns"):
         values[key] = {name: list(row) for name, row in values[key].items()}
     return _save(config_directory() / "window.toml", values, schema.WindowLayout, day)
 

@@ -336,7 +336,7 @@ class Settings(_Checked, frozen=True):
 
 
 class WindowLayout(_Checked, frozen=True):
-    """How the window was left: place, size, screen, widths, and what tables are sorted by."""
+    """How the window was left: place, size, screen, widths, and columns and order of tables."""
 
     x: int = 0
     y: int = 0
@@ -349,6 +349,8 @@ class WindowLayout(_Checked, frozen=True):
     """By the name of a table or splitter, in pixels of a screen at 96 dpi."""
     sorted_by: dict[str, tuple[int, bool]] = {}
     """By the name of a table: number of the column, from 0, and whether descending."""
+    columns: dict[str, tuple[str, ...]] = {}
+    """By the name of a table: names of the shown columns, in their order."""
 
     def __post_init__(self) -> None:
         pixels = [(name, getattr(self, name)) for name in ("x", "y", "width", "height")]

@@ -6,6 +6,7 @@ from PySide6.QtCore import QPoint, QRect, QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QHeaderView, QMainWindow, QSplitter, QWidget
 
+from app.qt.widgets.tables import show_columns, shown_columns
 from config.schema import WindowLayout
 
 _NAME = "remembered"
@@ -17,7 +18,7 @@ _GRIP = QSize(160, 40)
 
 
 def persist_layout(part: QHeaderView | QSplitter, name: str) -> None:
-    """Store the widths in a table or splitter, and the sort order of a table, under a name."""
+    """Store the widths in a table or splitter, and columns and sort order of a table, under a name."""
     part.setProperty(_NAME, name)
 
 
@@ -48,6 +49,8 @@ class WindowGeometry:
 
     def restore_parts(self, screen: QWidget) -> None:
         for name, part in _parts(screen):
+            if isinstance(part, QHeaderView):
+                show_columns(part, self._place.columns.get(name, ()))
             widths = self._place.widths.get(name, ())
             if len(widths) == part.count():
                 _set_widths(part, widths)
@@ -70,6 +73,7 @@ class WindowGeometry:
             screen=screen,
             widths={**self._place.widths, **widths},
             sorted_by={**self._place.sorted_by, **_orders(parts)},
+            columns={**self._place.columns, **_columns(parts)},
         )
 
 
@@ -86,7 +90,8 @@ def _set_widths(part: QHeaderView | QSplitter, widths: tuple[int, ...]) -> None:
         part.setSizes(list(widths))
         return
     for number, width in enumerate(widths):
-        part.resizeSection(number, max(width, part.minimumSectionSize()))
+        if width:  # of a hidden column nothing is known
+            part.resizeSection(number, max(width, part.minimumSectionSize()))
 
 
 def _orders(parts: dict[str, QHeaderView | QSplitter]) -> dict[str, tuple[int, bool]]:
@@ -95,6 +100,11 @@ def _orders(parts: dict[str, QHeaderView | QSplitter]) -> dict[str, tuple[int, b
         for name, part in parts.items()
         if isinstance(part, QHeaderView) and part.isSortIndicatorShown()
     }
+
+
+def _columns(parts: dict[str, QHeaderView | QSplitter]) -> dict[str, tuple[str, ...]]:
+    columns = {name: shown_columns(part) for name, part in parts.items() if isinstance(part, QHeaderView)}
+    return {name: shown for name, shown in columns.items() if shown}
 
 
 def _widths(part: QHeaderView | QSplitter) -> tuple[int, ...]:

@@ -40,6 +40,11 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     friction_dynamic: float | None = None
     """Of the newest saved analysis, stale or not."""
     friction_dynamic_uncertainty: float | None = None
+    period_s: float | None = None
+    """Of the same analysis, as the next three."""
+    period_uncertainty_s: float | None = None
+    damping_n1_per_s: float | None = None
+    damping_n1_uncertainty_per_s: float | None = None
     stale: bool = False
     """Masses, calibration or pullback have been changed since the newest saved analysis."""
     adequate: bool | None = None  # whether its model fits; None where it has none
@@ -62,7 +67,10 @@ def summarize_file(file: h5py.File) -> RunSummary:
     metadata = read_metadata(file)
     rows = stored_rows(file)
     analyses = read_analyses(file)
-    friction = analyses[-1].document["results"].get("friction_dynamic", {}) if analyses else {}
+    results = analyses[-1].document["results"] if analyses else {}
+    friction, period, damping = (
+        results.get(name, {}) for name in ("friction_dynamic", "period_s", "damping_n1_per_s")
+    )
     model = (analyses[-1].document["model"] or {}) if analyses else {}
     return RunSummary(
         path=file.filename,
@@ -75,6 +83,10 @@ def summarize_file(file: h5py.File) -> RunSummary:
         analyses=len(analyses),
         friction_dynamic=friction.get("value"),
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
+        period_s=period.get("value"),
+        period_uncertainty_s=period.get("standard_uncertainty"),
+        damping_n1_per_s=damping.get("value"),
+        damping_n1_uncertainty_per_s=damping.get("standard_uncertainty"),
         stale=bool(analyses) and analyses[-1].metadata_hash != metadata_hash(file, metadata),
         adequate=model.get("adequate"),
         friction_holds=model.get("degree") == Degree.FRICTION.value,

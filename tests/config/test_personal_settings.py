@@ -33,7 +33,8 @@ def test_without_a_file_the_defaults_hold_and_nothing_is_written(folder: Path) -
 def test_what_is_kept_comes_back() -> None:
     chosen = Settings("dark", "ru", 1.5, "/data/runs", "Анна", sounds=True)
     widths, sorted_by = {"runs": (184, 140), "identify": (900, 380)}, {"runs": (3, True)}
-    place = WindowLayout(10, -20, 1280, 800, False, "runs", widths, sorted_by)
+    columns = {"runs": ("DATE", "FRICTION"), "campaign": ("series",)}
+    place = WindowLayout(10, -20, 1280, 800, False, "runs", widths, sorted_by, columns)
     assert save_settings(chosen, DAY) is None
     assert save_window_layout(place, DAY) is None
     assert load_settings() == chosen
@@ -57,6 +58,7 @@ def test_what_was_used_last_comes_back(device: RecentDevice | None) -> None:
         '[widths]\nruns = "wide"',
         "[sorted_by]\nruns = [1]",
         '[sorted_by]\nruns = ["date", true]',
+        "[columns]\nruns = [1, 2]",
     ],
 )
 def test_a_place_that_no_window_can_have_is_refused_and_put_aside_later(folder: Path, rubbish: str) -> None:

@@ -44,12 +44,6 @@ def all_columns() -> tuple[tuple[QuantityDefinition, TableColumn], ...]:
     return table_columns(optional_columns())
 
 
-def hidden_columns() -> dict[int, str]:
-    """Places and descriptions of columns that are hidden at first."""
-    places = enumerate(all_columns())
-    return {place: gettext(row.description) for place, (row, column) in places if column.is_optional}
-
-
 @dataclass(frozen=True, slots=True)
 class ContactBars:
     """Bars of Fig. 2 for one contact: means over its series, and the series."""

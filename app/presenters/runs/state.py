@@ -1,17 +1,19 @@
 """State of the Runs screen."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, Tone
+from app.presenters.results import ResultRow
 from messages.i18n import N_
 
 
 class Column(StrEnum):
-    """Columns of the table, in order; the value is the title."""
+    """Columns of the table; the value is the title. The order of the screen is that of `USUAL_COLUMNS`."""
 
     NAME = N_("Run")
     DATE = N_("Recorded")
@@ -22,6 +24,37 @@ class Column(StrEnum):
     OPERATOR = N_("Operator")
     DURATION = N_("Length, s")
     ENDED = N_("Ended")
+    PERIOD = "T, ms"
+    DAMPING = "n₁, 1/s"
+    SOURCE = N_("Source")
+    TEMPERATURE = "°C"
+    FILE = N_("File")
+
+
+USUAL_COLUMNS = (
+    Column.DATE,
+    Column.SERIES,
+    Column.NAME,
+    Column.FRICTION,
+    Column.PERIOD,
+    Column.DAMPING,
+    Column.VERDICT,
+    Column.SOURCE,
+    Column.TEMPERATURE,
+    Column.NOTE,
+)
+"""Those that are shown until others are chosen; time and series are said once."""
+COLUMN_HINTS = {
+    Column.NAME: N_("number of the run in its series, or the name of the file"),
+    Column.PERIOD: N_("period of the joint motion"),
+    Column.DAMPING: N_("damping of the joint motion"),
+    Column.SOURCE: N_("recorded from a stand, simulated, or imported"),
+    Column.TEMPERATURE: N_("temperature"),
+    Column.FRICTION: N_("dynamic friction coefficient"),
+    Column.FILE: N_("name of the file"),
+    Column.VERDICT: N_("whether the model explains the record"),
+}
+"""What titles mean that do not say it."""
 
 
 class StatusFilter(StrEnum):
@@ -49,6 +82,8 @@ class RunRow:
 
     path: str
     cells: tuple[str, ...]
+    results: Mapping[Column, ResultRow] = field(default_factory=dict)
+    """Quantities that columns show, with uncertainties and units."""
     tone: Tone = Tone.PLAIN
     hint: str = ""
 

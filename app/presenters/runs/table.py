@@ -1,13 +1,16 @@
 """Rows of the table of runs: filtered, sorted and formatted."""
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from analysis.catalogue import definition
 from analysis.quantities import Quantity
 from app.presenters import number_text
 from app.presenters.base import Tone
-from app.presenters.results import sentence
+from app.presenters.results import ResultRow, sentence
+from app.presenters.results import make_row as result_row
 from app.presenters.runs.state import Column, MetadataForm, RunFilter, RunRow, StatusFilter
 from app.runs.metadata import RunSource
 from messages.i18n import N_, gettext
@@ -16,6 +19,12 @@ from messages.message import Message
 if TYPE_CHECKING:
     from app.runs.summary import RunSummary
 
+_SOURCES = {
+    RunSource.REAL: N_("real"),
+    RunSource.SIMULATED: N_("simulated"),
+    RunSource.IMPORTED: N_("imported"),
+}
+_USUAL_NAME = re.compile(r"\d{8}T\d{6}_(?:(?P<series>.+)_)?(?P<number>\d{3,})")
 _END_REASONS = {
     "rest": N_("at rest"),
     "enough": N_("enough"),
@@ -82,26 +91,32 @@ def select_runs(
 def make_row(run: "RunSummary") -> RunRow:
     if run.fault:
         known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + gettext("unreadable")}
-        return RunRow(run.path, _cells(known), Tone.BAD, sentence(run.fault))
+        return RunRow(run.path, _cells(known), tone=Tone.BAD, hint=sentence(run.fault))
     verdict, tone, hint = _verdict(run)
     if run.excluded:
         verdict = gettext("{verdict}, left out", verdict=verdict)
         said = gettext("It does not count on Campaign: {reason}", reason=run.excluded)
         hint = f"{hint}\n{said}".strip()
     start = run.start_time.astimezone() if run.start_time else None
+    results, temperature_c = _results(run), run.conditions.temperature_c
     known = {
-        Column.NAME: Path(run.path).stem,
+        **{column: row.value for column, row in results.items()},
+        Column.NAME: _short_name(run),
+        Column.FILE: Path(run.path).stem,
         Column.DATE: f"{start:%Y-%m-%d %H:%M}" if start else "",
         Column.SERIES: run.series or "–",
-        Column.FRICTION: _friction(run),
         Column.VERDICT: verdict,
+        Column.SOURCE: gettext(_SOURCES[run.source]) if run.source else "",
+        Column.TEMPERATURE: "" if temperature_c is None else number_text.format_fixed(temperature_c, 1),
         Column.DURATION: number_text.format_fixed(run.duration_s, 1),
         Column.ENDED: gettext(_END_REASONS.get(run.ended, run.ended))
         or (gettext("imported") if run.source is RunSource.IMPORTED else gettext("not closed")),
         Column.OPERATOR: run.operator,
         Column.NOTE: run.note,
     }
-    return RunRow(run.path, _cells(known), tone, hint)
+    if (friction := results.get(Column.FRICTION)) is not None:
+        known[Column.FRICTION] = f"{friction.value} {friction.uncertainty_text}".strip()
+    return RunRow(run.path, _cells(known), results, tone, hint)
 
 
 def metadata_form(runs: "list[RunSummary]") -> MetadataForm | None:
@@ -142,14 +157,26 @@ def _verdict(run: "RunSummary") -> tuple[str, Tone, str]:
     return "■ " + gettext("does not fit"), Tone.BAD, ""
 
 
-def _friction(run: "RunSummary") -> str:
-    if run.friction_dynamic is None:
-        return ""
-    uncertainty = run.friction_dynamic_uncertainty
-    if uncertainty is None:
-        return number_text.format_fixed(run.friction_dynamic, 5)
-    value, spread = number_text.format_uncertain(Quantity.normal(run.friction_dynamic, uncertainty, "1"))
-    return f"{value} ± {spread}" if spread else value
+def _results(run: "RunSummary") -> dict[Column, ResultRow]:
+    """Quantities of the newest saved analysis."""
+    stored = {
+        Column.FRICTION: ("friction_dynamic", run.friction_dynamic, run.friction_dynamic_uncertainty),
+        Column.PERIOD: ("period_s", run.period_s, run.period_uncertainty_s),
+        Column.DAMPING: ("damping_n1_per_s", run.damping_n1_per_s, run.damping_n1_uncertainty_per_s),
+    }
+    rows = {column: (definition(name), value, spread) for column, (name, value, spread) in stored.items()}
+    return {
+        column: result_row(row, Quantity.normal(value, spread or 0.0, row.unit))
+        for column, (row, value, spread) in rows.items()
+        if value is not None
+    }
+
+
+def _short_name(run: "RunSummary") -> str:
+    """Number of a run whose file is named by time and series, which stand beside it; else the file's name."""
+    stem = Path(run.path).stem
+    named = _USUAL_NAME.fullmatch(stem)
+    return named["number"] if named and (named["series"] or "") == (run.series or "") else stem
 
 
 _STATUS_CONDITIONS: "dict[StatusFilter, Callable[[RunSummary], bool]]" = {
@@ -162,10 +189,15 @@ _STATUS_CONDITIONS: "dict[StatusFilter, Callable[[RunSummary], bool]]" = {
 
 
 _SORT_KEYS: "dict[Column, Callable[[RunSummary], Any]]" = {
-    Column.NAME: lambda run: Path(run.path).name.casefold(),
+    Column.NAME: lambda run: (_short_name(run).casefold(), Path(run.path).name.casefold()),
+    Column.FILE: lambda run: Path(run.path).name.casefold(),
     Column.DATE: lambda run: run.start_time,
     Column.SERIES: lambda run: run.series or None,
     Column.FRICTION: lambda run: run.friction_dynamic,
+    Column.PERIOD: lambda run: run.period_s,
+    Column.DAMPING: lambda run: run.damping_n1_per_s,
+    Column.SOURCE: lambda run: run.source and gettext(_SOURCES[run.source]),
+    Column.TEMPERATURE: lambda run: run.conditions.temperature_c,
     Column.VERDICT: lambda run: None if run.fault else _verdict(run)[0],
     Column.DURATION: lambda run: None if run.fault else run.duration_s,
     Column.ENDED: lambda run: run.ended or None,

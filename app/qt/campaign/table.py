@@ -1,7 +1,7 @@
 """Table 1 as it fills: a row a series, each cell a value above its uncertainty."""
 
 from PySide6.QtCore import QModelIndex, QPersistentModelIndex, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QAction, QColor, QFontMetrics, QKeyEvent, QPainter, QPalette, QResizeEvent
+from PySide6.QtGui import QColor, QFontMetrics, QKeyEvent, QPainter, QPalette, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -12,12 +12,15 @@ from PySide6.QtWidgets import (
     QTableWidgetItem,
 )
 
-from app.presenters.campaign.state import Cell, TableRow, hidden_columns
+from app.presenters.campaign.state import Cell, TableRow, all_columns
 from app.qt.theme import TextRole, Theme, font
+from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, serve_table
+from app.qt.window_geometry import persist_layout
 from messages.i18n import gettext, ngettext
 
 _LINES = Qt.ItemDataRole.UserRole + 1
 _PADDING, _ROW_HEIGHT = 6, 38
+_SERIES = "series"  # name of the first column
 _MARKS = {"bad": "■ ", "warn": "▲ ", "ok": "✓ "}
 _Index = QModelIndex | QPersistentModelIndex
 _Line = tuple[str, TextRole, str]
@@ -35,7 +38,7 @@ class SeriesTable(QTableWidget):
         self._rows: tuple[TableRow, ...] = ()
         self.setItemDelegate(_LinesDelegate(theme, self))
         self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setAlternatingRowColors(True)
         self.setShowGrid(False)
@@ -53,28 +56,17 @@ class SeriesTable(QTableWidget):
 
     def show_columns(self, columns: tuple[tuple[str, str], ...]) -> None:
         self.setColumnCount(1 + len(columns))
-        titles = [f"{symbol}\n{unit}" for symbol, unit in columns]
-        for column, title in enumerate([gettext("series"), *titles]):
-            head = QTableWidgetItem(title)
-            side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft
-            head.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
-            self.setHorizontalHeaderItem(column, head)
-        for place, name in hidden_columns().items():
-            self.setColumnHidden(1 + place, True)
-            self._offer_column(1 + place, name)
-
-    def _offer_column(self, column: int, name: str) -> None:
-        """Let the context menus of table and header show and hide a column."""
-        action = QAction(gettext("Column: {name}", name=name), self)
-        action.setCheckable(True)
-        action.toggled.connect(lambda shown: self._show_column(column, shown=shown))
-        for widget in (self, self.horizontalHeader()):
-            widget.setContextMenuPolicy(Qt.ContextMenuPolicy.ActionsContextMenu)
-            widget.addAction(action)
-
-    def _show_column(self, column: int, *, shown: bool) -> None:
-        self.setColumnHidden(column, not shown)
-        self._fit()
+        self.setHorizontalHeaderItem(0, _title_item(gettext("series"), _SERIES))
+        for column, ((symbol, unit), (quantity, _)) in enumerate(
+            zip(columns, all_columns(), strict=True), start=1
+        ):
+            title = _title_item(f"{symbol}\n{unit}", quantity.name, gettext(quantity.description))
+            copied = [", ".join(filter(None, (name, unit))) for name in (symbol, f"u({symbol})")]
+            title.setData(COPIED_ROLE, copied)
+            self.setHorizontalHeaderItem(column, title)
+        usual = [quantity.name for quantity, column in all_columns() if not column.is_optional]
+        serve_table(self, (_SERIES, *usual), self._fit)
+        persist_layout(self.horizontalHeader(), "campaign")
 
     def show_rows(self, rows: tuple[TableRow, ...]) -> None:
         chosen = self._chosen()
@@ -166,10 +158,20 @@ def _series_item(row: TableRow) -> QTableWidgetItem:
     return item
 
 
+def _title_item(title: str, name: str, hint: str = "") -> QTableWidgetItem:
+    item = QTableWidgetItem(title)
+    side = Qt.AlignmentFlag.AlignLeft if name == _SERIES else Qt.AlignmentFlag.AlignRight
+    item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
+    item.setToolTip(hint)
+    item.setData(NAME_ROLE, name)
+    return item
+
+
 def _cell_item(cell: Cell) -> QTableWidgetItem:
     value = (cell.value, TextRole.TEXT, "text")
     item = _item(value, (cell.uncertainty, TextRole.LABEL, "muted"), Qt.AlignmentFlag.AlignRight, cell.hint)
     item.setData(Qt.ItemDataRole.AccessibleTextRole, f"{cell.value} {cell.uncertainty}".strip() or cell.hint)
+    item.setData(COPIED_ROLE, [cell.value, cell.uncertainty.removeprefix("± ")])
     return item
 
 

@@ -33,6 +33,7 @@ from app.qt.widgets.plot_curves import Points
 from app.qt.widgets.plot_marks import pen
 from app.qt.widgets.plots import PlotStack
 from app.qt.widgets.shortcuts import bind_button
+from app.qt.widgets.tables import serve_table
 from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, show_chip, stopped_chip
 from messages.i18n import N_, gettext
 
@@ -174,7 +175,8 @@ class _ReadingsTable(QTableWidget):
         self._shown: tuple[object, object] = ((), None)
         self.setHorizontalHeaderLabels((gettext("dial, mm"), gettext("counts"), gettext("residual, µm")))
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
-        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
         self.setTabKeyNavigation(False)
         self.setShowGrid(False)
         self.setAlternatingRowColors(True)
@@ -183,6 +185,7 @@ class _ReadingsTable(QTableWidget):
         header = self.horizontalHeader()
         header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(1, QHeaderView.ResizeMode.Stretch)
+        serve_table(self)
         self.setMinimumHeight(140)
         self.setAccessibleName(gettext("Readings taken"))
 

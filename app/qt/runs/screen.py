@@ -24,7 +24,7 @@ from messages.i18n import N_, gettext, ngettext
 if TYPE_CHECKING:
     from app.qt.window import MainWindow
 
-_COLUMN_SHARE = 0.34
+_COLUMN_SHARE = 0.30
 _COLUMN_WIDTHS = (360, 620)
 _ALL_SERIES = N_("All series")
 

@@ -1,5 +1,6 @@
 """The table of runs: thousands of lines, drawn only as far as they are seen."""
 
+from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import (
@@ -15,16 +16,34 @@ from PySide6.QtGui import QColor, QKeyEvent
 from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
 
 from app.presenters.base import Tone
-from app.presenters.runs.state import Column, RunRow
+from app.presenters.runs.state import COLUMN_HINTS, USUAL_COLUMNS, Column, RunRow
 from app.qt.theme import Theme
+from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, serve_table
 from app.qt.window_geometry import persist_layout
 from messages.i18n import gettext
 
 Index = QModelIndex | QPersistentModelIndex
 _COLUMNS = tuple(Column)
-_RIGHT = {Column.FRICTION, Column.DURATION}
-_WIDTHS = (220, 128, 84, 148, 124, 180, 104, 84, 92)
-"""Of `Column` in this order."""
+_MEASURED = {Column.FRICTION: "f_d", Column.PERIOD: "T", Column.DAMPING: "n1"}
+"""Symbols in the titles of copied columns, where the uncertainty has a column of its own."""
+_RIGHT = {*_MEASURED, Column.DURATION, Column.TEMPERATURE}
+_WIDTHS = {
+    Column.NAME: 50,
+    Column.DATE: 126,
+    Column.SERIES: 68,
+    Column.FRICTION: 134,
+    Column.PERIOD: 68,
+    Column.DAMPING: 70,
+    Column.VERDICT: 84,
+    Column.SOURCE: 78,
+    Column.TEMPERATURE: 44,
+    Column.NOTE: 64,
+    Column.OPERATOR: 104,
+    Column.DURATION: 84,
+    Column.ENDED: 92,
+    Column.FILE: 220,
+}
+"""At 96 dpi; those that are shown at first fit beside the preview in a window of 1280."""
 _LINE_HEIGHT = 28
 _ARROWS = (Qt.Key.Key_Up, Qt.Key.Key_Down)
 
@@ -61,8 +80,10 @@ class RunsTable(QTableView):
         titles.setSortIndicatorShown(True)
         titles.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         persist_layout(titles, "runs")
-        for number, width in enumerate(_WIDTHS):
-            self.setColumnWidth(number, width)
+        titles.setMinimumSectionSize(min(_WIDTHS.values()))
+        for number, column in enumerate(_COLUMNS):
+            self.setColumnWidth(number, _WIDTHS[column])
+        serve_table(self, [column.name for column in USUAL_COLUMNS])
         titles.sortIndicatorChanged.connect(self._want_order)
         self.selectionModel().selectionChanged.connect(self._tell_selected)
         self.doubleClicked.connect(lambda _: self.open_requested.emit())
@@ -140,7 +161,10 @@ class _Model(QAbstractTableModel):
             case Qt.ItemDataRole.DisplayRole:
                 return text
             case Qt.ItemDataRole.ToolTipRole:
-                return row.hint if column is Column.VERDICT and row.hint else text
+                return _hint(row, column) or text
+            case _ if role == COPIED_ROLE and column in _MEASURED:
+                result = row.results.get(column)
+                return ("", "") if result is None else (result.value, result.uncertainty)
             case Qt.ItemDataRole.TextAlignmentRole if column in _RIGHT:
                 return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
             case Qt.ItemDataRole.ForegroundRole if column is Column.VERDICT and row.tone is not Tone.PLAIN:
@@ -152,8 +176,27 @@ class _Model(QAbstractTableModel):
     ) -> Any:
         if orientation is not Qt.Orientation.Horizontal:
             return None
-        if role == Qt.ItemDataRole.DisplayRole:
-            return gettext(_COLUMNS[section].value)
-        if role == Qt.ItemDataRole.TextAlignmentRole and _COLUMNS[section] in _RIGHT:
-            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        column = _COLUMNS[section]
+        match role:
+            case Qt.ItemDataRole.DisplayRole:
+                return gettext(column.value)
+            case Qt.ItemDataRole.ToolTipRole:
+                return gettext(COLUMN_HINTS[column]) if column in COLUMN_HINTS else None
+            case Qt.ItemDataRole.TextAlignmentRole if column in _RIGHT:
+                return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+            case _ if role == NAME_ROLE:
+                return column.name
+            case _ if role == COPIED_ROLE and column in _MEASURED:
+                unit = column.value.partition(", ")[2]
+                symbol = _MEASURED[column]
+                return tuple(", ".join(filter(None, (name, unit))) for name in (symbol, f"u({symbol})"))
         return None
+
+
+def _hint(row: RunRow, column: Column) -> str:
+    if column is Column.VERDICT:
+        return row.hint
+    if column is Column.NAME:
+        return Path(row.path).stem
+    result = row.results.get(column)
+    return "" if result is None else f"{result.value} {result.uncertainty_text}".strip()

@@ -7,8 +7,9 @@ import pytest
 from campaign_stage import ALL_SERIES, FOLDER, found, path_of, runs_with_a_mode
 from looking import clipped_words, visible_words
 from pointing import Hand
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QPushButton
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QApplication, QMenu, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker
 
@@ -197,6 +198,29 @@ def test_friction_of_the_plate_alone_is_hidden_until_it_is_chosen(stage: Stage) 
     table = stage.screen._table
     (column,) = [place for place in range(table.columnCount()) if table.isColumnHidden(place)]
     assert table.horizontalHeaderItem(column).text().startswith("f_dp")
-    (action,) = table.horizontalHeader().actions()
-    action.trigger()
+    choose_in_menu(table, "f_dp: ")
+    header = table.horizontalHeader()
     assert not table.isColumnHidden(column)
+    shown = sum(header.sectionSize(place) for place in range(table.columnCount()))
+    assert shown == pytest.approx(table.viewport().width(), abs=table.columnCount())
+
+
+def choose_in_menu(table: QTableWidget, text: str) -> None:
+    table.horizontalHeader().customContextMenuRequested.emit(QPoint(5, 5))
+    (menu,) = [menu for menu in table.findChildren(QMenu) if menu.isVisible()]
+    (action,) = [action for action in menu.actions() if action.text().startswith(text)]
+    menu.close()
+    action.trigger()
+
+
+def test_rows_of_the_table_are_copied_with_uncertainties_in_columns_of_their_own(stage: Stage) -> None:
+    stage.gathered()
+    table = stage.screen._table
+    table.selectRow(0)
+    choose_in_menu(table, "Copy rows")
+    titles, row = (line.split("\t") for line in QGuiApplication.clipboard().text().splitlines())
+    cells = dict(zip(titles, row, strict=True))
+    first = stage.presenter.state.summary.rows[0]
+    assert cells["series"] == first.label == "1FFM0"
+    assert (cells["f_d"], cells["u(f_d)"]) == (first.cells[7].value, first.cells[7].uncertainty[2:])
+    assert float(cells["T, ms"]) > 0.0

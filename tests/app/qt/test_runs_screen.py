@@ -1,22 +1,27 @@
 """The Runs screen: table, preview and facts follow the state; keys and clicks reach the presenter."""
 
+import datetime
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from looking import clipped_words, plain, visible_words
+from msgspec.structs import replace
 from pointing import Hand
 from PySide6.QtCore import QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent, QTextDocument
-from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QMessageBox, QPushButton
+from PySide6.QtGui import QDropEvent, QGuiApplication, QTextDocument
+from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QMessageBox, QPushButton, QStyle
 from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker
 
 from app.presenters.runs.presenter import RunsPresenter
-from app.presenters.runs.state import BatchOutcome, Column, Overlay, Trace
+from app.presenters.runs.state import USUAL_COLUMNS, BatchOutcome, Column, Overlay, Trace
 from app.qt.runs.export_dialog import ExportDialog
 from app.qt.runs.screen import RunsScreen
 from app.qt.theme import Theme
+from app.qt.widgets.tables import shown_columns
+from app.runs.metadata import Conditions, RunSource
 from app.runs.summary import RunSummary
 
 RUNS = tuple(
@@ -122,14 +127,112 @@ def test_a_click_on_a_title_sorts(stage: Stage) -> None:
     assert stage.presenter.state.rows[0].path == RUNS[-1].path != first.path
 
 
-def test_names_of_runs_are_whole_and_titles_stand_over_their_figures(stage: Stage) -> None:
-    model, table = stage.table.model(), stage.table
-    needed = table.fontMetrics().horizontalAdvance("20261122T142611_3SSLM3_003") + 16
-    assert table.columnWidth(0) >= needed
+MEASURED = RunSummary(
+    path="/runs/20260201T142611_3SSLM3_003.h5",
+    series="3SSLM3",
+    start_time=datetime.datetime(2026, 2, 1, 14, 26, 11, tzinfo=datetime.UTC),
+    source=RunSource.SIMULATED,
+    conditions=Conditions(temperature_c=21.46),
+    analyses=1,
+    adequate=True,
+    friction_dynamic=-0.10030,
+    friction_dynamic_uncertainty=0.00064,
+    period_s=0.319942,
+    period_uncertainty_s=4.8e-5,
+    damping_n1_per_s=0.12104,
+    damping_n1_uncertainty_per_s=0.0042,
+    note="a note that is longer than its column",
+)
+
+
+def list_measured(stage: Stage) -> None:
+    stage.presenter.refresh()
+    stage.answer("list_folder", (MEASURED, *(replace(MEASURED, path=f"/runs/{n}.h5") for n in range(60))))
+    QApplication.processEvents()
+
+
+def column_of(column: Column) -> int:
+    return list(Column).index(column)
+
+
+def test_a_run_says_its_time_and_series_once_and_what_was_found_where_from_and_how_warm(
+    stage: Stage,
+) -> None:
+    list_measured(stage)
+    header, model = stage.table.horizontalHeader(), stage.table.model()
+    assert shown_columns(header) == tuple(column.name for column in USUAL_COLUMNS)
+    row = stage.presenter.state.rows[0]
+    cells = dict(zip(Column, row.cells, strict=True))
+    assert [cells[column] for column in USUAL_COLUMNS[1:-1]] == [
+        "3SSLM3", "003", "−0.10030 ± 0.00064", "319.942", "0.1210", "✓ fits", "simulated", "21.5",
+    ]  # fmt: skip
+    assert cells[Column.DATE].startswith("2026-02-0")
+    assert cells[Column.FILE] == "20260201T142611_3SSLM3_003"
+    assert dict(zip(Column, stage.presenter.state.rows[1].cells, strict=True))[Column.NAME] == "0"
+    hint = model.index(0, column_of(Column.PERIOD)).data(Qt.ItemDataRole.ToolTipRole)
+    assert hint == "319.942 ± 0.048\u202fms"
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+def test_a_window_of_1280_shows_the_usual_columns_without_scrolling_sideways(
+    theme: Theme, qtbot: QtBot, language: str, use_language: Callable[[str], None]
+) -> None:
+    use_language(language)
+    stage = Stage(theme, qtbot)
+    stage.screen.resize(1280 - 90, 780)
+    list_measured(stage)
+    table = stage.table
+    assert table.horizontalScrollBar().maximum() == 0
+    assert table.verticalScrollBar().maximum() > 0
+    margin = 2 * (table.style().pixelMetric(QStyle.PixelMetric.PM_FocusFrameHMargin) + 1)
+    for column in USUAL_COLUMNS[:-1]:
+        index = table.model().index(0, column_of(column))
+        needed = table.fontMetrics().horizontalAdvance(index.data()) + margin
+        assert table.columnWidth(index.column()) >= needed, column
+    assert table.columnWidth(column_of(Column.NOTE)) >= 60
+
+
+def test_rows_are_copied_with_uncertainties_in_columns_of_their_own(stage: Stage) -> None:
+    list_measured(stage)
+    stage.click_row(0)
+    stage.screen.activateWindow()
+    stage.qtbot.keyClick(stage.table, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    titles, row = (line.split("\t") for line in QGuiApplication.clipboard().text().splitlines())
+    assert dict(zip(titles, row, strict=True)) == {
+        "Recorded": stage.presenter.state.rows[0].cells[column_of(Column.DATE)],
+        "Series": "3SSLM3",
+        "Run": "003",
+        "f_d": "-0.10030",
+        "u(f_d)": "0.00064",
+        "T, ms": "319.942",
+        "u(T), ms": "0.048",
+        "n1, 1/s": "0.1210",
+        "u(n1), 1/s": "0.0042",
+        "Model": "✓ fits",
+        "Source": "simulated",
+        "°C": "21.5",
+        "Note": "a note that is longer than its column",
+    }
+
+
+def test_the_new_columns_sort(stage: Stage) -> None:
+    stage.presenter.refresh()
+    other = replace(MEASURED, path="/runs/b.h5", period_s=0.2, source=RunSource.REAL, conditions=Conditions())
+    stage.answer("list_folder", (MEASURED, other))
+    for column in (Column.PERIOD, Column.SOURCE):
+        stage.presenter.sort_by(column)
+        assert [row.path for row in stage.presenter.state.rows] == [other.path, MEASURED.path]
+    stage.presenter.sort_by(Column.TEMPERATURE)
+    assert stage.presenter.state.rows[0].path == MEASURED.path, "what has no value comes last"
+
+
+def test_titles_stand_over_their_figures(stage: Stage) -> None:
+    model = stage.table.model()
     for number, column in enumerate(Column):
         side = model.headerData(number, Qt.Orientation.Horizontal, Qt.ItemDataRole.TextAlignmentRole)
         is_right = side is not None and bool(side & Qt.AlignmentFlag.AlignRight)
-        assert is_right == (column in {Column.FRICTION, Column.DURATION})
+        figures = {Column.FRICTION, Column.PERIOD, Column.DAMPING, Column.DURATION, Column.TEMPERATURE}
+        assert is_right == (column in figures)
 
 
 def test_no_dash_of_the_legend_is_parted_from_its_name(stage: Stage) -> None:
