@@ -313,7 +313,7 @@ def test_the_window_tells_how_it_is_left(desk: Desk) -> None:
     desk.presenter.show_screen(Screen.RUNS)
     desk.window.close()
     assert places[0].screen == "runs"
-    assert len(places[0].widths["runs"]) == 9
+    assert len(places[0].widths["runs"]) == 14
 
 
 @pytest.mark.parametrize("width", [1024, 1280])

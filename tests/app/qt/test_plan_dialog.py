@@ -109,7 +109,8 @@ def test_changes_are_stored_at_once_and_undone_one_by_one(page: Page) -> None:
     page.press(Qt.Key.Key_Delete)
     page.press(Qt.Key.Key_Delete)
     assert page.rows == ["2SSM0 2 0 next"]
-    stored = [task for task in page.stage.tasks() if isinstance(task, SavePlan)]
+    asked = [call.arguments[0] for call in page.stage.files.calls]
+    stored = [task for task in asked if isinstance(task, SavePlan)]
     assert [len(task.tests.plan) for task in stored] == [2, 1]
     page.press(Qt.Key.Key_Z, CONTROL)
     page.press(Qt.Key.Key_Z, CONTROL)
