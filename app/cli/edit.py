@@ -76,10 +76,8 @@ def _fields_of_run(run: Run, given: dict[str, Any], condition: list[str] | None)
 def _conditions(before: Conditions, pairs: list[str]) -> Conditions:
     """Conditions with some given anew; the others stay."""
     given = Conditions.parse(key_values(pairs, "--condition"))
-    new = {
-        name: value for name, value in msgspec.structs.asdict(given).items() if value not in (None, "", {})
-    }
-    return before.replace(**new, other={**before.other, **given.other})
+    new = {name: value for name, value in msgspec.structs.asdict(given).items() if value not in (None, "")}
+    return before.replace(**new | {"other": before.other | given.other})
 
 
 def _print_history(run: Run) -> None:

@@ -30,6 +30,14 @@ def test_an_edit_makes_the_result_stale_and_undo_makes_it_good(slipstand: Any, r
     assert_one_error_line(slipstand("edit", run, "--undo"), "no edit to undo")
 
 
+def test_a_condition_of_ones_own_stands_beside_the_others(slipstand: Any, run: Path) -> None:
+    assert slipstand("edit", run, "--condition", "lab=B2", "--condition", "plate_id=P1").code == 0
+    assert slipstand("edit", run, "--condition", "floor=3", "--condition", "plate_id=P2").code == 0
+    (listed,) = slipstand("runs", run.parent, "--json").json
+    assert listed["conditions"]["other"] == {"lab": "B2", "floor": "3"}
+    assert listed["conditions"]["plate_id"] == "P2"
+
+
 def test_runs_that_a_filter_leaves_out_are_not_said_to_be_missing(slipstand: Any, run: Path) -> None:
     said = slipstand("runs", run.parent, "--stale").out
     assert "is of that kind" in said
