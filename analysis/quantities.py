@@ -40,9 +40,10 @@ def result_warning(code: str, template: str, /, **values: Any) -> ResultWarning:
 
 
 class SharedBy(Enum):
-    """Which runs have the error of a source in common."""
+    """Which results have the error of a source in common."""
 
-    NONE = "none"  # each run has an error of its own: repeats average it
+    NONE = "none"  # each result has an error of its own: repeats average it
+    RUN = "run"  # all results of one run: repeats average it
     CALIBRATION = "calibration"
     SERIES = "series"
     STAND = "stand"
@@ -56,7 +57,8 @@ class BudgetSource(Enum):
     PLATE_MASS = N_("plate mass")
     MASS = N_("mass")
     GRAVITY = N_("gravity")
-    TIME_BASE = N_("time base")
+    TIME_BASE = N_("time base"), SharedBy.RUN  # the clock is timed in each run
+    NOMINAL_RATE = N_("nominal rate")  # what a run that was timed badly takes of the device's nominal rate
     TIME_BASE_NOT_STATED = N_("time base (not stated)")
     LEVELLING = N_("levelling of the plane"), SharedBy.SERIES, True
     GAUGE_1_GAIN = N_("gauge 1 gain"), SharedBy.CALIBRATION

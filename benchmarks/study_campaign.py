@@ -26,7 +26,6 @@ from app.runs.analysis_input import build_record
 from app.runs.campaign.run_result import run_result
 from app.runs.saved_analyses import analysis_document
 from app.simulated_stand.synthetic_campaign import (
-    CLOCK_UNCERTAINTY,
     CampaignOptions,
     Comparison,
     SyntheticTest,
@@ -35,10 +34,10 @@ from app.simulated_stand.synthetic_campaign import (
     sample_test,
     series_truths,
     test_metadata,
+    timed_clock,
 )
 from benchmarks.studies import options, percent, spread_out, table
 from config.files import load_gauges, load_stand, published_table
-from drivers.clock import TimeBase
 from drivers.samples import Losses
 
 SERIES, REPEATS = 3, 3
@@ -67,8 +66,8 @@ def result(test: SyntheticTest) -> RunResult:
     """One run, as it would come out of its file."""
     block, _ = sample_test(test, load_gauges())
     metadata = test_metadata(test)
-    time_base = TimeBase(scale_standard_uncertainty=CLOCK_UNCERTAINTY)
-    record = build_record(metadata, block.time_s, block.readings[:, 0], block.readings[:, 1], time_base)
+    readings = block.readings
+    record = build_record(metadata, block.time_s, readings[:, 0], readings[:, 1], timed_clock(test))
     path = Path(test.path)
     return run_result(path, metadata, analysis_document(path, test.series, Losses(), identify(record)))
 

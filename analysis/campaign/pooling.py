@@ -42,6 +42,12 @@ class RunValue:
     half_widths: tuple[float, float]  # of the 95 % interval, below and above the value
     unit: str
     model: float = 0.0  # the part of `common` that the run's model leaves unexplained
+    of_run: float = 0.0  # the part of `repeatable` that all quantities of the run share
+
+    @property
+    def of_quantity(self) -> float:
+        """The part of `repeatable` that no other quantity of the run shares."""
+        return math.sqrt(max(0.0, self.repeatable**2 - self.of_run**2))
 
 
 def run_value(run: RunResult, name: str) -> RunValue | None:
@@ -56,13 +62,14 @@ def run_value(run: RunResult, name: str) -> RunValue | None:
     stated = quantity.standard_uncertainty if quantity.standard_uncertainty < _LARGEST else 0.0
     if not lines and stated:
         lines = [BudgetLine(BudgetSource.UNDIVIDED, name, stated)]
-    common, own = _split_budget(run, lines)
+    common, of_run, own = _split_budget(run, lines)
     low, high = quantity.interval_95
     reach = quantity.value - low, high - quantity.value
     own = max(own, _own_by_interval(sum(reach) / 2.0 / COVERAGE_FACTOR_95, stated, common))
     smallest = max(_SMALLEST * abs(quantity.value), 1.0 / _LARGEST)
     model = math.hypot(*(share for error, share in common.items() if error.source is BudgetSource.MODEL))
-    return RunValue(run.name, quantity.value, max(own, smallest), common, reach, quantity.unit, model)
+    own = max(own, smallest)
+    return RunValue(run.name, quantity.value, own, common, reach, quantity.unit, model, of_run)
 
 
 def run_ratio(run: RunResult, above: str, below: str) -> RunValue | None:
@@ -71,7 +78,11 @@ def run_ratio(run: RunResult, above: str, below: str) -> RunValue | None:
     if top is None or bottom is None or top.value == 0.0 or bottom.value == 0.0:
         return None
     value = top.value / bottom.value
-    own = abs(value) * math.hypot(top.repeatable / top.value, bottom.repeatable / bottom.value)
+    own = abs(value) * math.hypot(
+        top.of_quantity / top.value,
+        bottom.of_quantity / bottom.value,
+        top.of_run / top.value - bottom.of_run / bottom.value,
+    )
     if not max(abs(value), own) < _LARGEST:
         return None
     common = {
@@ -88,23 +99,26 @@ def has_stated_gains(run: RunResult, name: str) -> bool:
     return not any(line.contribution_to == name and line.source in _UNSTATED_GAINS for line in run.budget)
 
 
-def _split_budget(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[SharedError, float], float]:
+def _split_budget(run: RunResult, lines: list[BudgetLine]) -> tuple[dict[SharedError, float], float, float]:
+    """Errors shared with other runs, those shared by the results of this run, and all of this run alone."""
     shared_by = {
         SharedBy.CALIBRATION: run.calibration_id,
         SharedBy.STAND: run.stand_id,
         SharedBy.SERIES: run.series.label,
     }
     common: dict[SharedError, float] = {}
-    own = 0.0
+    of_run, own = 0.0, 0.0
     for line in lines:
         if not line.standard_uncertainty < _LARGEST:
             continue
-        if line.source.shared_by is SharedBy.NONE:
-            own = math.hypot(own, line.standard_uncertainty)
-        else:
+        if line.source.shared_by in shared_by:
             key = SharedError(line.source, shared_by[line.source.shared_by])
             common[key] = math.hypot(common.get(key, 0.0), line.standard_uncertainty)
-    return common, own
+            continue
+        own = math.hypot(own, line.standard_uncertainty)
+        if line.source.shared_by is SharedBy.RUN:
+            of_run = math.hypot(of_run, line.standard_uncertainty)
+    return common, of_run, own
 
 
 def _own_by_interval(deviation: float, stated: float, common: dict[SharedError, float]) -> float:

@@ -92,7 +92,7 @@ def mass_from_added_mass(
     """Mass (kg) from the damped periods (s) without and with a known `added` mass (kg) on the same spring.
 
     m = added / (k1^2 / k2^2 - 1), k^2 = (2 pi / T)^2 + n^2; without damping constants (1/s), n = 0.
-    A common error of the time base cancels in the ratio, so give periods with their type A uncertainty.
+    Errors that both runs share cancel in the ratio: give periods with the uncertainty of each run alone.
     Raises AnalysisError unless the loaded period is the longer one.
     """
     none = Quantity.normal(0.0, 0.0, "1/s")

@@ -32,7 +32,7 @@ from drivers.clock import TimeBase
 from drivers.samples import DeviceIdentity, SampleStatus
 from messages.message import Message
 
-CLOCK_UNCERTAINTY = 2e-5  # relative standard uncertainty of the device's clock, as the runs state it
+CLOCK_UNCERTAINTY = 2e-5  # relative standard uncertainty to which each run times the device's clock
 _BETWEEN_TESTS = datetime.timedelta(minutes=2)
 _UNTIL_REST_S = 90.0
 _SURELY_SLIPS = 1.05  # release over f_s g from which f_s of the paper is true; below it no slip
@@ -231,7 +231,7 @@ def write_test(test: SyntheticTest) -> StoredRun:
         end_time=test.start_time + datetime.timedelta(seconds=float(block.time_s[-1])),
         events=Events(pulled_back_s=0.0, release_s=release_s),
         losses=count_flags(block.status),
-        time_base=TimeBase(scale_standard_uncertainty=CLOCK_UNCERTAINTY),
+        time_base=timed_clock(test),
     )
     return write_run(Path(test.path), test_metadata(test), block, ending)
 
@@ -266,6 +266,12 @@ def sample_test(test: SyntheticTest, gauges: Gauges) -> tuple[RunBlock, float]:
         status[overloaded] |= np.uint8(flag)
     block = RunBlock(time_s, np.column_stack(readings), status, np.column_stack(counts))
     return block, release_s / (1.0 + errors.clock)
+
+
+def timed_clock(test: SyntheticTest) -> TimeBase:
+    """The device's clock as it was timed in the run of a test."""
+    error = CLOCK_UNCERTAINTY * np.random.default_rng((*test.seed, 2)).standard_normal()
+    return TimeBase(1.0 + test.errors.clock + error, CLOCK_UNCERTAINTY)
 
 
 class RecordedTest(msgspec.Struct, frozen=True):

@@ -244,3 +244,41 @@ def test_a_run_that_its_model_explains_badly_counts_less():
 
     assert found.quantity.value == pytest.approx((10.0 * 1.0 + 1.01) / 11.0)
     assert found.common == pytest.approx({MODEL: 0.03 / 11.0})
+
+
+def timed_run(name, period_s, noise_s, clock):
+    """A run whose clock was timed to the relative standard uncertainty `clock`."""
+    quantity = Quantity.normal(period_s, math.hypot(noise_s, clock * period_s), "s")
+    lines = (
+        BudgetLine(BudgetSource.NOISE, "period_s", noise_s),
+        BudgetLine(BudgetSource.TIME_BASE, "period_s", clock * period_s),
+    )
+    return replace(run(name, "1FFM0", {}), results={"period_s": quantity}, budget=lines)
+
+
+def test_clocks_that_each_run_timed_for_itself_err_independently():
+    """Two periods that agree within 0.9 u, one with little noise beside the other."""
+    clock = 5e-5
+    first, apart = 0.32, 0.9 * math.sqrt(2.0) * clock * 0.32
+    runs = [timed_run("a", first, 1e-7, clock), timed_run("b", first + apart, 1e-6, clock)]
+    (found,) = pool([[run_value(one, "period_s") for one in runs]], proportional=True)
+
+    assert found.birge_ratio == pytest.approx(0.9, rel=1e-2)
+    assert found.quantity.value == pytest.approx(first + apart / 2.0, abs=0.01 * apart)
+    assert found.quantity.standard_uncertainty == pytest.approx(clock * 0.32 / math.sqrt(2.0), rel=1e-2)
+    assert found.common == {}
+
+
+def test_the_clock_of_a_run_cancels_in_a_ratio_of_its_results():
+    lines = [
+        BudgetLine(source, name, size)
+        for name, value in (("friction_static", 0.2), ("friction_dynamic", 0.1))
+        for source, size in ((BudgetSource.NOISE, 1e-4 * value), (BudgetSource.TIME_BASE, 0.01 * value))
+    ]
+    results = {name: Quantity.normal(0.1, 1e-3, "1") for name in ("friction_static", "friction_dynamic")}
+    results["friction_static"] = Quantity.normal(0.2, 2e-3, "1")
+    both = replace(run("a", "1FFM0", {}), results=results, budget=tuple(lines))
+    found = run_ratio(both, "friction_static", "friction_dynamic")
+
+    assert found.value == pytest.approx(2.0)
+    assert found.repeatable == pytest.approx(2.0 * 1e-4 * math.sqrt(2.0))
