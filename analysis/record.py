@@ -1,12 +1,14 @@
 """What an analysis takes: one pullback test as arrays, with what is known about the stand and gauges."""
 
-from dataclasses import dataclass, replace
+import math
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from messages.message import MessageError
+from messages.i18n import N_
+from messages.message import MessageError, message
 
 
 class AnalysisError(MessageError):
@@ -138,6 +140,8 @@ class Record:
     relative_gauge: GaugeUncertainty = GaugeUncertainty()
     gauge_2_measures_plate: bool = False
     """True when gauge 2 measures the plate against the base instead of against the table."""
+    release: int | None = None
+    """Which release is analysed, from 1 in order of time; None: the one with the longest decay."""
 
     @classmethod
     def from_arrays(
@@ -184,6 +188,26 @@ class Record:
         """Return a copy with `changes`."""
         return replace(self, **changes)
 
+    def between(self, first_s: float, last_s: float) -> Self:
+        """Return the samples of a span, both ends included. Raises RecordError where there are none."""
+        kept = (self.time_s >= first_s) & (self.time_s <= last_s)
+        if not kept.any():
+            template = N_(
+                "the record spans {start_s:.6g} to {end_s:.6g} s, of which nothing is left {part}. Choose"
+                " another part."
+            )
+            part = message("from {first_s:g} to {last_s:g} s", first_s=first_s, last_s=last_s)
+            if math.isinf(first_s):
+                part = message("until {last_s:g} s", last_s=last_s)
+            elif math.isinf(last_s):
+                part = message("from {first_s:g} s", first_s=first_s)
+            raise RecordError(template, start_s=self.time_s[0], end_s=self.time_s[-1], part=part)
+        columns = {
+            field.name: column[kept]
+            for field in fields(self)
+            if isinstance(column := getattr(self, field.name), np.ndarray)
+        }
+        return self.replace(**columns)
 
 def _float_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     try:

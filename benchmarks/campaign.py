@@ -22,7 +22,7 @@ os.environ["OMP_NUM_THREADS"] = "1"  # as `slipstand` does, before numpy
 os.environ["OPENBLAS_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from app.runs.analyze import AnalysisRequest
+from app.runs.analysis_request import AnalysisRequest
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisTask, analyze_one, analyze_runs
 from app.runs.campaign.collect import CollectOptions, collect_runs

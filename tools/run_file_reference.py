@@ -71,6 +71,10 @@ def reference() -> str:
             *_fields(schema.END_FIELDS),
             "\n## Written by the program\n",
             *_fields(schema.PROGRAM_FIELDS),
+            "\n## Each saved analysis, in its group `analysis_NNN`\n",
+            *_fields(schema.ANALYSIS_FIELDS),
+            "\nThe groups `results`, `model`, `tried`, `budget`, `events` and `warnings` beside them repeat"
+            "\nparts of `document` for other programs; this one reads `document`.",
             "",
         ]
     )

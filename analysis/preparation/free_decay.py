@@ -217,7 +217,7 @@ def prepare(record: Record) -> FreeDecay:
     """
     warnings: list[ResultWarning] = []
     channels = _valid_channels(record, warnings)
-    release = _choose_release(oscillation.find_releases(channels.table), warnings)
+    release = _choose_release(oscillation.find_releases(channels.table), record.release, warnings)
     stretch, period_s = _oriented_stretch(channels, release, record.gauge_2_measures_plate, warnings)
     stretch = _until_disturbance(stretch, period_s, warnings)
     if stretch.relative is None:
@@ -302,16 +302,27 @@ def _if_mostly_valid(readings: Channel, valid: Channel, warnings: list[ResultWar
     return None
 
 
-def _choose_release(releases: list[Release], warnings: list[ResultWarning]) -> Release:
-    """The release with the longest decay after it; one with a hold before it where there is one."""
-    if len(releases) > 1:
-        times = ", ".join(f"{release.time_s:.3f} s" for release in releases)
-        template = N_(
-            "the table was released or pushed, or gauge 1 jumped, {count} times (at {times}); the"
-            " longest decay is used."
+def _choose_release(releases: list[Release], number: int | None, warnings: list[ResultWarning]) -> Release:
+    """The release of this number, from 1, else that of the longest decay, after a hold if there is one."""
+    count, times = len(releases), ", ".join(f"{release.time_s:.3f} s" for release in releases)
+    if number is not None and not 1 <= number <= count:
+        raise RecordError(
+            "the record has no release {number}: {count} were found (at {times}). Choose one of these.",
+            number=number,
+            count=count,
+            times=times,
         )
-        warnings.append(result_warning("released-twice", template, count=len(releases), times=times))
-    chosen = max(releases, key=_release_preference)
+    if count > 1:
+        chosen_one = message("the longest decay is used")
+        if number is not None:
+            chosen_one = message("the decay after number {number} is used", number=number)
+        template = N_(
+            "the table was released or pushed, or gauge 1 jumped, {count} times (at {times}); {chosen}."
+        )
+        warnings.append(
+            result_warning("released-twice", template, count=count, times=times, chosen=chosen_one)
+        )
+    chosen = max(releases, key=_release_preference) if number is None else releases[number - 1]
     if chosen.plateau_start_s is None:
         text = message("the record begins after the release: pullback and release time are extrapolated.")
         warnings.append(ResultWarning("release-not-recorded", text))

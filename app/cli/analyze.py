@@ -1,24 +1,27 @@
 """`slipstand analyze`: identify runs, print or keep the results."""
 
+import math
 from collections.abc import Generator, Iterator
 from contextlib import closing, nullcontext
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import typer
 
 from analysis.formatting import format_value
 from analysis.laws.catalogue import LAWS
 from analysis.one_mass.identify import mass_from_added_mass
-from analysis.quantities import BudgetSource, Quantity
+from analysis.quantities import Quantity, SharedBy
 from app.cli import output as out
 from app.cli.analysis_text import print_analysis
 from app.cli.errors import CommandError, alternatives, error_text
 from app.cli.option_values import executor_options, figure_file
 from app.cli.recover import print_interrupted_run
 from app.cli.result_options import AddedMassOptions, AnalyzeOptions
-from app.runs.analysis_json import quantity_document
-from app.runs.analyze import REFITS_MAX, REFITS_MIN, Analysis, AnalysisRequest, analyze_run
+from app.runs.analysis_json import quantity_document, read_budget_line
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import REFITS_MAX, REFITS_MIN, Analysis, analyze_run
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs, build_outcome
 from app.runs.listing import resolve_run_files
@@ -36,12 +39,18 @@ def analyze(options: AnalyzeOptions) -> None:
             f"--figure {options.figure} is one file for {len(paths)} runs. Analyse them one by one"
         )
     figure = figure_file(options.figure, force=options.force)
-    tasks = [AnalysisTask(str(path), request, options.save, options.anew) for path in paths]
+    requests = [request] * (len(paths) - 1) + [_loaded(request, options.added)]
+    tasks = [
+        AnalysisTask(str(path), one, options.save, options.anew)
+        for path, one in zip(paths, requests, strict=True)
+    ]
     outcomes = _analyze_with_figure(tasks[0], figure) if figure else _analyze_runs(tasks, executor)
     failed = False
     with out.print_json_list() if options.as_json else nullcontext(None) as add, closing(outcomes):
         documents: Iterator[dict[str, Any]] = (_report_run(outcome, options.as_json) for outcome in outcomes)
-        if options.added.added_mass is not None:  # computed from both analyses, or not at all
+        if (
+            options.added.added_mass is not None and len(paths) == 2
+        ):  # computed from both analyses, or not at all
             documents = iter(_with_table_mass(list(documents), options.added, options.as_json))
         for document in documents:
             failed |= "error" in document
@@ -54,10 +63,7 @@ def analyze(options: AnalyzeOptions) -> None:
 def _with_table_mass(
     documents: list[dict[str, Any]], options: AddedMassOptions, as_json: bool
 ) -> list[dict[str, Any]]:
-    """Append the mass of the table to the analyses of both runs, unless one failed.
-
-    The time base is common to both runs and cancels, so that the periods count with their noise alone.
-    """
+    """Append the mass of the table to the analyses of both runs, unless one failed."""
     if any("error" in document for document in documents):
         return documents
     added = Quantity.normal(options.added_mass or 0.0, options.added_mass_uncertainty, "kg")
@@ -71,8 +77,20 @@ def _with_table_mass(
     return [*documents, {"kind": "table-mass", "runs": runs, "results": results}]
 
 
+def _loaded(request: AnalysisRequest, options: AddedMassOptions) -> AnalysisRequest:
+    """The request for the run in which the table carries the added mass."""
+    if options.added_mass is None:
+        return request
+    uncertainty_kg = options.added_mass_uncertainty
+    return msgspec.structs.replace(
+        request, added_mass_kg=options.added_mass, added_mass_uncertainty_kg=uncertainty_kg
+    )
+
+
 def _request(options: AnalyzeOptions) -> AnalysisRequest:
     """Build the request. Raises CommandError for options that do not fit together."""
+    span = options.span
+    span.check(options.kind)
     model, refits = options.model, options.monte_carlo
     if model not in MODELS:
         laws = [f"{law.name} ({law.description})" for law in LAWS]
@@ -83,13 +101,28 @@ def _request(options: AnalyzeOptions) -> AnalysisRequest:
             raise CommandError(
                 "--model and --monte-carlo are for two masses. Leave them out with --kind one-mass"
             )
-        return AnalysisRequest(kind="one-mass", table_mass_kg=table_kg, plate_mass_kg=plate_kg)
+        return AnalysisRequest(
+            kind="one-mass",
+            table_mass_kg=table_kg,
+            plate_mass_kg=plate_kg,
+            from_s=span.from_s,
+            until_s=span.until_s,
+        )
     if refits is not None and refits != 0 and not REFITS_MIN <= refits <= REFITS_MAX:
         raise CommandError(
             f"--monte-carlo {refits} refits give no interval. Give {REFITS_MIN} to {REFITS_MAX}, some"
             " thousand are good, or 0 for the draws alone"
         )
-    return AnalysisRequest(model, "two-mass", table_kg, plate_kg, refits)
+    return AnalysisRequest(
+        model,
+        "two-mass",
+        table_kg,
+        plate_kg,
+        refits,
+        from_s=span.from_s,
+        until_s=span.until_s,
+        release=span.release,
+    )
 
 
 def _analyze_runs(tasks: list[AnalysisTask], options: ExecutorOptions) -> Generator[AnalysisOutcome]:
@@ -131,12 +164,12 @@ def save_figure(analysis: Analysis, path: Path) -> None:
     save_record_figure(path, analysis.record, analysis.identification, metadata.title, metadata.unit)
 
 
-def _quantity(document: dict[str, Any], name: str) -> Any:
-    """A result with its type A uncertainty."""
-    result = document["results"][name]
-    noise = [
-        line["standard_uncertainty"]
-        for line in document["budget"]
-        if line["contribution_to"] == name and line["source"] == str(BudgetSource.NOISE)
+def _quantity(document: dict[str, Any], name: str) -> Quantity:
+    """A result with the uncertainty that its run does not share with others."""
+    result, lines = document["results"][name], map(read_budget_line, document["budget"])
+    own = [
+        line.standard_uncertainty
+        for line in lines
+        if line.contribution_to == name and line.source.shared_by in (SharedBy.NONE, SharedBy.RUN)
     ]
-    return Quantity.normal(result["value"], noise[0] if noise else 0.0, result["unit"])
+    return Quantity.normal(result["value"], math.hypot(*own), result["unit"])

@@ -20,7 +20,8 @@ from app.cli.measurement_options import DemoOptions
 from app.cli.option_values import calibration_file, checked, executor_options, key_values, recordings_folder
 from app.cli.record import record_with_progress
 from app.runs.analysis_json import read_quantity
-from app.runs.analyze import AnalysisRequest, analyze_run
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import analyze_run
 from app.runs.campaign.collect import CollectedRuns, CollectOptions, collect_runs
 from app.runs.listing import find_run_files
 from app.runs.paths import recordings_directory

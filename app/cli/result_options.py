@@ -14,12 +14,33 @@ FIGURE_FORMATS = ("png", "svg", "pdf")
 
 
 @dataclass(frozen=True, kw_only=True)
+class SpanOptions:
+    """Which part of a record is analysed."""
+
+    from_s: float | None = number("--from", "First time of the record that is analysed (s).")
+    until_s: float | None = number("--until", "Last time of the record that is analysed (s).")
+    release: int | None = number(
+        "--release",
+        "Which release of the record, from 1; the one with the longest decay if absent.",
+        least=1,
+        integer=True,
+    )
+
+    def check(self, kind: str) -> None:
+        """Refuse a span without an inside, and releases of one mass. Raises CommandError."""
+        if self.from_s is not None and self.until_s is not None and self.from_s >= self.until_s:
+            raise CommandError(f"--from {self.from_s:g} is not before --until {self.until_s:g}. Swap them")
+        if self.release is not None and kind == "one-mass":
+            raise CommandError("--release is for two masses. Choose the decay of one by --from and --until")
+
+
+@dataclass(frozen=True, kw_only=True)
 class AddedMassOptions:
-    """Mass that was added to the table between two free decays."""
+    """Mass that was added to the table, in one free decay or between two."""
 
     added_mass: float | None = number(
         "--added-mass",
-        "With --kind one-mass and two runs: mass (kg) that was added to the table in the second.",
+        "With --kind one-mass: mass (kg) added to the table, in the second of two runs, which give its own.",
         above=0.0,
     )
     added_mass_uncertainty: float = number(
@@ -28,10 +49,10 @@ class AddedMassOptions:
 
     def check(self, kind: str, runs: int) -> None:
         """Refuse an added mass that does not fit the other options. Raises CommandError."""
-        if self.added_mass is not None and (kind != "one-mass" or runs != 2):
+        if self.added_mass is not None and (kind != "one-mass" or runs > 2):
             raise CommandError(
-                "--added-mass needs --kind one-mass and two runs: the bare table first, then the same with"
-                " the added mass"
+                "--added-mass needs --kind one-mass and one run with that mass, or two runs: the bare table"
+                " first, then the same with the added mass"
             )
         if self.added_mass is None and self.added_mass_uncertainty:
             raise CommandError("--added-mass-uncertainty goes with --added-mass. Give that too")
@@ -53,6 +74,7 @@ class AnalyzeOptions:
     monte_carlo: int | None = option(
         "--monte-carlo", "Check the uncertainties by 100,000 draws and N full refits.", metavar="N"
     )
+    span: SpanOptions
     added: AddedMassOptions
     save: bool = flag("--save", "Keep the result in the run, unless the same is kept already.")
     anew: bool = flag("--anew", "With --save: analyse and keep the result in any case.")

@@ -59,9 +59,10 @@ def _row(run: RunSummary) -> tuple[str, ...]:
 
 def _friction_text(run: RunSummary) -> str:
     """Newest f_d, with what is to be known of it in a word."""
+    damaged = ["a result is damaged"] if run.damaged_analyses else []
     if run.friction_dynamic is None:
-        return ""
-    marks = ["stale"] if run.stale else []
+        return "".join(damaged)
+    marks = damaged + (["stale"] if run.stale else [])
     unfit = "model does not fit, f_d holds" if run.friction_holds else "model does not fit"
     marks += [unfit] if run.adequate is False else []
     marks += ["left out"] if run.excluded else []

@@ -15,7 +15,8 @@ from app.presenters.analysed_run import AnalysedRun, AnalysisTask, Channel, Kine
 from app.presenters.base import Progress, ReportProgress
 from app.presenters.recovery import RecoveryReport
 from app.presenters.results import FRICTION, sentence
-from app.runs.analyze import Analysis, AnalysisRequest, analyze_run
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import Analysis, analyze_run
 from app.runs.paths import journal_folders
 from messages.i18n import gettext, translate
 

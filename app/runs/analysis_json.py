@@ -19,6 +19,7 @@ from messages.message import Message, joined, message
 
 if TYPE_CHECKING:
     from analysis.classical_estimates import ClassicalEstimates
+    from app.runs.analysis_request import AnalysisRequest
     from app.runs.metadata import EndMetadata, RunMetadata
     from config.schema import Gauge, GaugeCheck, Gauges
 
@@ -179,6 +180,19 @@ def mass_warnings(metadata: "RunMetadata", used: StandMasses) -> Iterator[Result
     if masses:
         text = message("analysed with {masses}.", masses=joined(masses, " and "))
         yield ResultWarning("masses-given", text)
+
+
+def added_mass_warnings(request: "AnalysisRequest", used: StandMasses) -> Iterator[ResultWarning]:
+    """Say which mass stiffness and damping are of, where the table carried more than its own."""
+    if request.added_mass_kg is not None:
+        text = message(
+            "the table carried {added_kg:g} kg beside its own {table_kg:g} kg: stiffness and damping"
+            " coefficient are those of {together_kg:g} kg.",
+            added_kg=request.added_mass_kg,
+            table_kg=used.table_mass_kg,
+            together_kg=used.table_mass_kg + request.added_mass_kg,
+        )
+        yield ResultWarning("mass-added", text)
 
 
 def unstated_warnings(record: Record, result: Identification) -> Iterator[ResultWarning]:

@@ -1,9 +1,9 @@
 """One run identified: from its file to the numbers, and back into the file when asked."""
 
 import dataclasses
+import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Literal
 
 import msgspec
 
@@ -15,10 +15,18 @@ from analysis.quantities import Quantity
 from analysis.record import Record
 from app.runs import analysis_json
 from app.runs.analysis_input import to_record
-from app.runs.errors import MetadataError
+from app.runs.analysis_request import AnalysisRequest
 from app.runs.metadata import QUANTITY_UNITS
+from app.runs.origin import analysis_origin
 from app.runs.reader import Run, open_run
-from app.runs.saved_analyses import Document, analysis_document, inputs_hash, latest_valid, save_analysis
+from app.runs.saved_analyses import (
+    Document,
+    SavedAnalysis,
+    analysis_document,
+    inputs_hash,
+    latest_valid,
+    save_analysis,
+)
 from app.runs.validator import Validator
 from drivers.samples import Losses
 from messages.message import Message
@@ -27,27 +35,6 @@ Progress = Callable[[float, str | Message], None]
 """Called with the share that is done and what is being done, a name or a message."""
 REFITS_MIN, REFITS_MAX = 100, 1_000_000
 """A 95 % interval of fewer refits would be that of a handful."""
-
-
-class AnalysisRequest(msgspec.Struct, frozen=True):
-    """How to identify a run. Masses given here stand for those of the run, in this analysis alone."""
-
-    model: str = "auto"
-    kind: Literal["two-mass", "one-mass"] = "two-mass"
-    """`one-mass` takes gauge 1 alone: a bare table, or any free decay."""
-    table_mass_kg: float | None = None
-    plate_mass_kg: float | None = None
-    monte_carlo: int | None = None
-    classical: bool = True
-    """Work out the paper's own figures too, which takes half a second."""
-
-    def __post_init__(self) -> None:
-        for name in ("table_mass_kg", "plate_mass_kg"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 < value < float("inf"):
-                raise MetadataError(
-                    "{name} = {value:g} must be a finite number above 0", name=name, value=value
-                )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -59,6 +46,7 @@ class Analysis:
     identification: Identification
     document: Document
     saved_as: int | None = None
+    repeats: SavedAnalysis | None = None  # the kept analysis that it repeats
 
 
 def analyze_run(
@@ -76,7 +64,8 @@ def analyze_run(
     for many runs, else one is started. `trusted`: the caller has validated the file.
     """
     run = open_run(path, validator=validator, trusted=trusted)
-    record = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
+    whole = _with_masses(to_record(run, metres_only=request.kind == "two-mass"), request)
+    record = _selected(whole, request)
     if request.kind == "one-mass":
         identification = _one_mass(run, record, request)
     else:
@@ -87,6 +76,7 @@ def analyze_run(
     identification.warnings.extend(
         [
             *analysis_json.mass_warnings(metadata, record.masses),
+            *analysis_json.added_mass_warnings(request, record.masses),
             *analysis_json.unstated_warnings(record, identification),
             *analysis_json.calibration_warnings(
                 metadata.gauges, metadata.start_time and metadata.start_time.date()
@@ -101,6 +91,10 @@ def analyze_run(
     )
     losses = run.end.losses if run.end else Losses(samples=len(run))
     document = analysis_document(path, metadata.series, losses, identification)
+    inputs = inputs_hash(whole)
+    document["origin"] = analysis_origin(
+        path, metadata, run.identifier, request, inputs, has_gauge_2=run.relative_reading is not None
+    )
     if request.classical:
         document["classical"] = _classical(record, identification)
     if identification.monte_carlo is not None:
@@ -109,7 +103,7 @@ def analyze_run(
         )
     number = None
     if save:
-        number = save_analysis(path, document, inputs_hash(record), msgspec.to_builtins(request))
+        number = save_analysis(path, document, inputs, msgspec.to_builtins(request))
     return Analysis(run, record, identification, document, number)
 
 
@@ -126,8 +120,9 @@ def _one_mass(run: Run, record: Record, request: AnalysisRequest) -> Identificat
     in_metres = metadata.unit == QUANTITY_UNITS[metadata.quantity]
     mass = None
     if in_metres or request.table_mass_kg is not None:
-        masses = record.masses
-        mass = Quantity.normal(masses.table_mass_kg, masses.table_mass_uncertainty_kg, "kg")
+        table, added_kg = record.masses, request.added_mass_kg or 0.0
+        uncertainty_kg = math.hypot(table.table_mass_uncertainty_kg, request.added_mass_uncertainty_kg)
+        mass = Quantity.normal(table.table_mass_kg + added_kg, uncertainty_kg, "kg")
     unit = "m" if in_metres else metadata.unit.partition("/")[0]
     return identify_one_mass(record, quantity=metadata.quantity, unit=unit, mass=mass)
 
@@ -141,11 +136,20 @@ def _with_masses(record: Record, request: AnalysisRequest) -> Record:
     return record.replace(masses=dataclasses.replace(record.masses, **given)) if given else record
 
 
+def _selected(record: Record, request: AnalysisRequest) -> Record:
+    """The part of the record that is asked for. Raises RecordError for a span that the record lacks."""
+    if request.from_s is not None or request.until_s is not None:
+        ends = (request.from_s, -math.inf), (request.until_s, math.inf)
+        record = record.between(*(end if given is None else given for given, end in ends))
+    return record.replace(release=request.release)
+
+
 def repeat_saved_analysis(path: Path, validator: Validator | None = None) -> Analysis:
     """Identify a run as its newest analysis that still stands did. Raises RunError, AnalysisError."""
     run = open_run(path, validator=validator)
     in_metres = run.metadata.unit == "m" and run.metadata.quantity == "displacement"
     kept = latest_valid(run.analyses, to_record(run, metres_only=in_metres))
-    request = AnalysisRequest() if kept is None else msgspec.convert(kept.settings, AnalysisRequest)
-    request = msgspec.structs.replace(request, classical=False, monte_carlo=None)
-    return analyze_run(path, request, trusted=True)
+    asked = None if kept is None else AnalysisRequest.of_settings(kept.settings)
+    request = msgspec.structs.replace(asked or AnalysisRequest(), classical=False, monte_carlo=None)
+    analysis = analyze_run(path, request, trusted=True)
+    return analysis if kept is None else dataclasses.replace(analysis, repeats=kept)

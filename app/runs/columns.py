@@ -64,6 +64,13 @@ def read_column(dataset: h5py.Dataset, rows: slice) -> NDArray[Any]:
     return values
 
 
+def check_samples(file: h5py.File) -> None:
+    """Compare the checksums of all columns of samples with the stored ones. Raises DamagedRunError."""
+    if is_finished(file):
+        for path in sample_paths(file):
+            check_column(file[path], checksum(file[path]), file.filename)
+
+
 def check_column(dataset: h5py.Dataset, value: int, run: Path | str) -> None:
     """Compare the checksum of a column of the finished `run` with the stored one. Raises DamagedRunError."""
     stored = read_number(dataset.file, schema.checksum_path(dataset.name.lstrip("/")))

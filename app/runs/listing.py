@@ -11,11 +11,12 @@ from pathlib import Path
 import msgspec
 import platformdirs
 
+from app.runs.columns import check_samples
 from app.runs.disk import atomic_write, make_folder
 from app.runs.errors import DamagedRunError, NotARunError, RunError, RunNotFoundError
 from app.runs.lock import RECORDING_SUFFIX
 from app.runs.paths import TRASH, recordings_directory
-from app.runs.reader import check_openable
+from app.runs.reader import check_openable, read_file
 from app.runs.schema import SUFFIX
 from app.runs.summary import RunSummary
 from app.runs.validator import Validator
@@ -204,7 +205,10 @@ def _summary(path: Path, validator: Validator) -> tuple[RunSummary, bool]:
     """Summary of a file, and whether it holds until the file changes."""
     try:
         check_openable(path)
-        return msgspec.structs.replace(validator.validate(path), path=str(path)), True
+        summary = validator.validate(path)
+        if summary.analyses:  # their results are shown, and hold for these samples alone
+            read_file(path, check_samples)
+        return msgspec.structs.replace(summary, path=str(path)), True
     except (NotARunError, DamagedRunError) as error:
         return RunSummary(path=str(path), fault=error.message), True
     except RunError as error:

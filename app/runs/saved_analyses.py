@@ -4,6 +4,7 @@ import datetime
 import hashlib
 import math
 import re
+import zlib
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -22,9 +23,19 @@ from app.runs.analysis_json import (
     quantity_document,
     warning_documents,
 )
-from app.runs.fields import make_group, read_number, read_text, write_number, write_text
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.fields import (
+    make_group,
+    read_fields,
+    read_number,
+    read_text,
+    write_fields,
+    write_number,
+    write_text,
+)
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_metadata
+from app.runs.origin import analysis_origin
 from app.runs.rewrite import rewrite
 from app.version import __version__
 from config.schema import Gauge
@@ -47,6 +58,28 @@ class SavedAnalysis:
     document: Document
     metadata_hash: str = ""
     """Hash of what was known beside the samples, see `app.runs.saved_analyses`."""
+    commit: str = ""
+    request_hash: str = ""
+    reproduce: str = ""
+    """Command that gives the same digits; these three are empty in analyses of versions that kept none."""
+
+    def document_of(
+        self, path: Path, metadata: RunMetadata, identifier: str, *, has_gauge_2: bool
+    ) -> Document:
+        """The document for a run that may have been moved; its origin is that of the run where none was kept.
+
+        For an analysis that still stands, so that masses and calibration are those of the run.
+        """
+        document = self.document | {"run": str(path.absolute())}
+        request = AnalysisRequest.of_settings(self.settings)
+        if request is None:
+            return document
+        inputs = self.inputs_hash
+        origin = document.get("origin")
+        if origin is None:
+            origin = analysis_origin(path, metadata, identifier, request, inputs, has_gauge_2=has_gauge_2)
+            origin |= {"version": self.version, "commit": None, "date": self.date.isoformat()}
+        return document | {"origin": origin | {"reproduce": request.command(path.absolute())}}
 
 
 def analysis_document(
@@ -73,9 +106,12 @@ def analysis_document(
 
 
 def inputs_hash(record: Record) -> str:
-    """Hash of all that an analysis takes: readings, masses, calibration uncertainties, clock."""
+    """Hash of all that an analysis takes: readings, masses, calibration uncertainties, clock.
+
+    Which release of the record is analysed belongs to the request.
+    """
     digest = hashlib.blake2b(digest_size=16)
-    for field in fields(record):
+    for field in (field for field in fields(record) if field.name != "release"):
         value = getattr(record, field.name)
         digest.update(field.name.encode())
         digest.update(value.tobytes() if isinstance(value, np.ndarray) else msgspec.json.encode(value))
@@ -93,20 +129,41 @@ def save_analysis(path: Path, document: Document, inputs: str, settings: dict[st
 
     `inputs` is the `inputs_hash` of the analysed record; `settings` say how it was analysed.
     """
-    number = 0
+    origin = document.get("origin", {})
+    settings, number = settings or {}, 0
+    masses = {name: settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
 
     def add(file: h5py.File) -> None:
         nonlocal number
         number = max(_numbers(file), default=0) + 1
-        _write(file, number, document, inputs, settings or {})
+        kept = SavedAnalysis(
+            number=number,
+            date=datetime.datetime.now().astimezone().replace(microsecond=0),
+            version=__version__,
+            inputs_hash=inputs,
+            settings=settings,
+            document=document,
+            metadata_hash=metadata_hash(file, **masses),
+            **{name: origin.get(name) or "" for name in ("commit", "request_hash", "reproduce")},
+        )
+        _write(_group(file, number), kept)
 
     rewrite(path, add)
     return number
 
 
 def read_analyses(file: h5py.File) -> tuple[SavedAnalysis, ...]:
-    """All analyses kept in an open run, oldest first."""
-    return tuple(_read(file, number) for number in _numbers(file))
+    """All analyses kept in an open run, oldest first; those that are damaged are left out."""
+    return tuple(
+        msgspec.convert(read_fields(group, schema.ANALYSIS_FIELDS), SavedAnalysis)
+        for group in (_group(file, number) for number in _numbers(file))
+        if not _is_damaged(group)
+    )
+
+
+def damaged_analyses(file: h5py.File) -> tuple[int, ...]:
+    """Numbers of the analyses in an open run that are not what was kept, by their checksum."""
+    return tuple(number for number in _numbers(file) if _is_damaged(_group(file, number)))
 
 
 def _numbers(file: h5py.File) -> list[int]:
@@ -114,30 +171,32 @@ def _numbers(file: h5py.File) -> list[int]:
     return sorted(int(match[1]) for match in found if match)
 
 
-def _read(file: h5py.File, number: int) -> SavedAnalysis:
-    group = file[f"{schema.ENTRY}/{schema.ANALYSIS_PREFIX}{number:03d}"]
-    return SavedAnalysis(
-        number=number,
-        date=datetime.datetime.fromisoformat(read_text(group, "date")),
-        version=read_text(group, "version"),
-        inputs_hash=read_text(group, "inputs_hash"),
-        settings=msgspec.json.decode(read_text(group, "settings", "{}"), type=dict[str, Any]),
-        document=msgspec.json.decode(read_text(group, "document"), type=dict[str, Any]),
-        metadata_hash=read_text(group, "facts_hash"),
-    )
+def _group(file: h5py.File, number: int) -> h5py.Group:
+    name = f"{schema.ANALYSIS_PREFIX}{number:03d}"
+    return file[schema.ENTRY].get(name) or make_group(file[schema.ENTRY], name, "NXprocess")
 
 
-def _write(file: h5py.File, number: int, document: Document, inputs: str, settings: dict[str, Any]) -> None:
-    group = make_group(file[schema.ENTRY], f"{schema.ANALYSIS_PREFIX}{number:03d}", "NXprocess")
+def _checksum(group: h5py.Group) -> int:
+    """CRC-32 of all texts of an analysis, whichever version wrote them."""
+    texts = [
+        f"{name}={read_text(group, name)}"
+        for name, item in sorted(group.items())
+        if isinstance(item, h5py.Dataset) and h5py.check_string_dtype(item.dtype)
+    ]
+    return zlib.crc32("\0".join(texts).encode())
+
+
+def _is_damaged(group: h5py.Group) -> bool:
+    """Tell whether an analysis is not what was kept. Earlier versions kept no checksum."""
+    stored = read_number(group, schema.ANALYSIS_CHECKSUM)
+    return stored is not None and stored != _checksum(group)
+
+
+def _write(group: h5py.Group, kept: SavedAnalysis) -> None:
+    document = kept.document
+    write_fields(group, schema.ANALYSIS_FIELDS, kept)
     write_text(group, "program", "slipstand")
-    write_text(group, "version", __version__)
-    write_text(group, "date", datetime.datetime.now().astimezone().isoformat(timespec="seconds"))
-    write_number(group, "sequence_index", number)
-    write_text(group, "inputs_hash", inputs)
-    masses = {name: settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
-    write_text(group, "facts_hash", metadata_hash(file, **masses))
-    write_text(group, "settings", msgspec.json.encode(settings).decode())
-    write_text(group, "document", msgspec.json.encode(document).decode())
+    group[schema.ANALYSIS_CHECKSUM] = np.uint32(_checksum(group))
     _write_results(make_group(group, "results", "NXcollection"), document["results"])
     model = document["model"] or {}
     _write_values(make_group(group, "model", "NXcollection"), model)

@@ -1,8 +1,8 @@
 """The run file declared once: groups, columns and metadata fields of HDF5 with type, unit and meaning.
 
-Paths are relative to the root of the file, except those of `GAUGE_FIELDS` and `CHECK_FIELDS`. The attribute
-of a field is its dotted path in `RunMetadata`, `EndMetadata`, `Gauge` or `GaugeCheck`; a field without one is
-written by the program itself.
+Paths are relative to the root of the file, except those of `GAUGE_FIELDS`, `CHECK_FIELDS` and
+`ANALYSIS_FIELDS`. The attribute of a field is its dotted path in `RunMetadata`, `EndMetadata`, `Gauge`,
+`GaugeCheck` or `SavedAnalysis`; a field without one is written by the program itself.
 """
 
 import enum
@@ -335,6 +335,23 @@ PROGRAM_FIELDS: Final = (
     _text(f"{NOTE}/type", "media type of the note"),
 )
 """Fields that the program writes by itself."""
+
+ANALYSIS_CHECKSUM: Final = "crc32"
+ANALYSIS_FIELDS: Final = (
+    _text("program", "slipstand"),
+    _text("version", "its version", "version"),
+    _text("commit", "commit that it was made of, where known", "commit"),
+    Field("date", "time of the analysis", "date", Kind.DATE),
+    Field("sequence_index", "number of the analysis", "number", Kind.INTEGER),
+    Field("settings", "how it was analysed", "settings", Kind.JSON, default={}),
+    _text("request_hash", "hash of what the settings ask for", "request_hash"),
+    _text("inputs_hash", "hash of readings, masses, calibration and clock", "inputs_hash"),
+    _text("facts_hash", "hash of the same without the readings", "metadata_hash"),
+    _text("reproduce", "command that gives the same digits", "reproduce"),
+    Field("document", "the result, as `analyze --json` gives it", "document", Kind.JSON),
+    Field(ANALYSIS_CHECKSUM, "CRC-32 of the texts above, sorted by name", kind=Kind.INTEGER),
+)
+"""Fields of `app.runs.saved_analyses.SavedAnalysis`, in the group `analysis_NNN` of each saved analysis."""
 
 REQUIRED_FIELDS: Final = tuple(
     field for field in (*RUN_FIELDS, *END_FIELDS, *PROGRAM_FIELDS) if field.required

@@ -11,7 +11,7 @@ from app.runs.columns import stored_rows
 from app.runs.fields import read_text
 from app.runs.metadata import Conditions, RunSource
 from app.runs.metadata_io import read_identifier, read_metadata
-from app.runs.saved_analyses import metadata_hash, read_analyses
+from app.runs.saved_analyses import damaged_analyses, metadata_hash, read_analyses
 from messages.message import Message
 
 
@@ -37,6 +37,7 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     origin: str = ""
     """Where a run that was not recorded here comes from, for example `imported from run.csv`."""
     analyses: int = 0
+    damaged_analyses: int = 0  # further ones, which are not what was kept and are not taken
     friction_dynamic: float | None = None
     """Of the newest saved analysis, stale or not."""
     friction_dynamic_uncertainty: float | None = None
@@ -81,6 +82,7 @@ def summarize_file(file: h5py.File) -> RunSummary:
         duration_s=float(file[schema.TIME][rows - 1]) if rows else 0.0,
         ended=read_text(file, schema.ENDED),
         analyses=len(analyses),
+        damaged_analyses=len(damaged_analyses(file)),
         friction_dynamic=friction.get("value"),
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
         period_s=period.get("value"),

@@ -65,7 +65,8 @@ def short_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
 @pytest.fixture(scope="session")
 def real_stand_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder of three analysed runs, not to be changed: a second mode in all, a long release in one."""
-    from app.runs.analyze import AnalysisRequest, analyze_run
+    from app.runs.analysis_request import AnalysisRequest
+    from app.runs.analyze import analyze_run
     from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, write_test
     from config.files import load_gauges, load_stand
 

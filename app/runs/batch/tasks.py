@@ -7,12 +7,14 @@ from typing import TypeVar
 import h5py
 import msgspec
 
-from app.runs.analyze import Analysis, AnalysisRequest, Progress, analyze_run
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import Analysis, Progress, analyze_run
 from app.runs.batch.executors import Executor, FailedItem, ordered_map
+from app.runs.columns import check_samples, signal_paths
 from app.runs.errors import internal_error, one_line
 from app.runs.fields import read_text
 from app.runs.metadata import RunMetadata
-from app.runs.metadata_io import read_metadata
+from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import check_openable, read_file
 from app.runs.saved_analyses import Document, SavedAnalysis, metadata_hash, read_analyses
 from app.runs.schema import ENDED
@@ -52,8 +54,8 @@ def analyze_one(
     try:
         kept = validate_and_count(path, validator or shared_validator())
         if kept and task.save and not task.force:
-            wanted = msgspec.to_builtins(task.request)
-            if (outcome := read_file(path, lambda file: _kept(file, path, wanted))) is not None:
+            outcome = read_file(path, lambda file: _kept(file, path, task.request))
+            if outcome is not None:
                 return outcome
         return build_outcome(analyze_run(path, task.request, save=task.save, progress=progress, trusted=True))
     except Exception as error:
@@ -85,25 +87,37 @@ def validate_and_count(path: Path, validator: Validator) -> int:
 def latest_valid_in_file(
     file: h5py.File, metadata: RunMetadata, wanted: Callable[[SavedAnalysis], bool]
 ) -> tuple[SavedAnalysis | None, bool]:
-    """Newest analysis kept in a run that is wanted and not stale; and whether newer ones are stale."""
+    """Newest analysis kept in a run that is wanted and not stale; and whether newer ones are stale.
+
+    Raises DamagedRunError where the samples that it was made of are not what was stored.
+    """
     stale = False
     for saved in reversed(read_analyses(file)):
         if not wanted(saved):
             continue
         masses = {name: saved.settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
         if saved.metadata_hash == metadata_hash(file, metadata, **masses):
+            check_samples(file)
             return saved, stale
         stale = True
     return None, stale
 
 
-def _kept(file: h5py.File, path: Path, wanted: dict[str, object]) -> AnalysisOutcome | None:
+def kept_document(file: h5py.File, saved: SavedAnalysis, metadata: RunMetadata) -> Document:
+    """Document of an analysis that is kept in an open run and still stands."""
+    has_gauge_2 = len(signal_paths(file)) > 1
+    return saved.document_of(Path(file.filename), metadata, read_identifier(file), has_gauge_2=has_gauge_2)
+
+
+def _kept(file: h5py.File, path: Path, wanted: AnalysisRequest) -> AnalysisOutcome | None:
     """The analysis kept in a run that was asked for in the same words, if it still stands."""
     metadata = read_metadata(file)
-    saved, _ = latest_valid_in_file(file, metadata, lambda saved: saved.settings == wanted)
+    saved, _ = latest_valid_in_file(
+        file, metadata, lambda saved: AnalysisRequest.of_settings(saved.settings) == wanted
+    )
     if saved is None:
         return None
-    document = saved.document | {"run": str(path)}
+    document = kept_document(file, saved, metadata)
     return AnalysisOutcome(
         str(path), document, up_to_date=True, unit=metadata.unit, ended=read_text(file, ENDED)
     )

@@ -12,7 +12,8 @@ import msgspec
 from analysis.campaign.campaign import Campaign, Excluded, summarize
 from analysis.campaign.series import RunResult
 from analysis.quantities import ResultWarning
-from app.runs.analyze import AnalysisRequest, Progress
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import Progress
 from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import AnalysisTask, map_runs
 from app.runs.campaign.run_result import CollectedRun, RunDetails, collect_run
@@ -24,7 +25,7 @@ from config.schema import ConfigError, Gauges, Stand
 from messages.i18n import N_
 from messages.message import Message, message
 
-Shared = TypeVar("Shared", Stand, Gauges)
+Shared = TypeVar("Shared", Stand, Gauges, dict[str, Any])
 
 
 class CollectOptions(msgspec.Struct, frozen=True):
@@ -140,10 +141,13 @@ class RunCollection:
             metadata = metadata.replace(
                 stand=self._share(metadata.stand), gauges=self._share(metadata.gauges)
             )
+            origin = details.origin
+            if calibrations := origin.get("calibrations"):
+                origin = origin | {"calibrations": self._share(calibrations)}
             collected = msgspec.structs.replace(
                 collected,
                 result=replace(result, budget=budget),
-                details=msgspec.structs.replace(details, metadata=metadata),
+                details=msgspec.structs.replace(details, metadata=metadata, origin=origin),
             )
         self._collected[collected.path] = collected
 
@@ -214,6 +218,7 @@ def campaign_warnings(
     yield from _different_stands(runs)
     yield from _contradictory_masses(runs)
     yield from _stale(runs, saved=saved)
+    yield from _damaged(runs)
     yield from _series_without_runs(runs)
     yield from _left_out(folders)
 
@@ -306,6 +311,19 @@ def _stale(runs: Sequence[CountedRun], *, saved: bool) -> Iterator[ResultWarning
                 " is taken agrees with them now, {kept}.",
                 listed=_listed(stale),
                 kept=kept,
+            ),
+        )
+
+
+def _damaged(runs: Sequence[CountedRun]) -> Iterator[ResultWarning]:
+    damaged = [run.name for run, details in runs if details.damaged]
+    if damaged:
+        yield ResultWarning(
+            "result-damaged",
+            message(
+                "results kept in {listed} are not what was kept, by their checksum: they are not taken."
+                " Restore a good copy.",
+                listed=_listed(damaged),
             ),
         )
 

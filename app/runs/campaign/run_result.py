@@ -1,9 +1,10 @@
 """What a campaign takes of one run file: its newest result that still stands, else a new one."""
 
 import contextlib
-import hashlib
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import h5py
 import msgspec
@@ -11,13 +12,21 @@ import msgspec
 from analysis.campaign.series import RunResult, SeriesKey
 from analysis.identification import Degree
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
+from app.runs.analysis_input import CLOCK_TOLERANCE
 from app.runs.analysis_json import read_budget_line, read_quantity, read_warning
 from app.runs.analyze import Progress, analyze_run
-from app.runs.batch.tasks import AnalysisTask, error_message, latest_valid_in_file, validate_and_count
+from app.runs.batch.tasks import (
+    AnalysisTask,
+    error_message,
+    kept_document,
+    latest_valid_in_file,
+    validate_and_count,
+)
+from app.runs.hashes import content_hash
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import read_file
-from app.runs.saved_analyses import Document
+from app.runs.saved_analyses import Document, damaged_analyses
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError
 from messages.message import EMPTY, Message
@@ -43,6 +52,8 @@ class RunDetails(msgspec.Struct, frozen=True):
     analysis: int | None = None
     """NNN of the `/entry/analysis_NNN` that was taken; None for a result that is not kept."""
     stale: bool = False  # a newer analysis is kept in the run that does not stand any more
+    damaged: tuple[int, ...] = ()  # numbers of kept analyses that are not what was kept
+    origin: Document = {}  # of the result, as `analyze --json` gives it
 
 
 class CollectedRun(msgspec.Struct, frozen=True):
@@ -66,7 +77,7 @@ def collect_run(
         if document is None:
             analysis = analyze_run(path, task.request, save=task.save, progress=progress, trusted=True)
             document = analysis.document
-            details = msgspec.structs.replace(details, analysis=analysis.saved_as)
+            details = msgspec.structs.replace(details, analysis=analysis.saved_as, origin=document["origin"])
         return CollectedRun(task.path, details=details, result=run_result(path, details.metadata, document))
     except Exception as error:
         return CollectedRun(task.path, error_message(error), details)
@@ -92,8 +103,13 @@ def _read(file: h5py.File) -> tuple[RunDetails, Document | None]:
             saved.document["kind"] == "two-mass" and not any(saved.settings.get(name) for name in _MASSES)
         ),
     )
-    details = RunDetails(metadata, read_identifier(file), saved.number if saved else None, stale)
-    return details, saved.document if saved else None
+    details = RunDetails(metadata, read_identifier(file), stale=stale, damaged=damaged_analyses(file))
+    if saved is None:
+        return details, None
+    document = kept_document(file, saved, metadata)
+    return msgspec.structs.replace(
+        details, analysis=saved.number, origin=document.get("origin", {})
+    ), document
 
 
 def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResult:
@@ -103,15 +119,18 @@ def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResu
     plate_mass_line = BudgetLine(BudgetSource.PLATE_MASS, "plate_mass_kg", mass_u_kg)
     found = document["results"].items()
     results = {name: read_quantity(value) for name, value in found if isinstance(value, dict)}
+    lines = _with_nominal_rate(map(read_budget_line, document["budget"]), results.get("period_s"))
     stand, device, model = metadata.stand, metadata.device, document["model"] or {}
     calibrations = (metadata.gauges.table, metadata.gauges.relative)
     return RunResult(
         name=str(path),
         series=series_key(metadata),
         results={"plate_mass_kg": mass} | results,
-        budget=(*map(read_budget_line, document["budget"]), plate_mass_line),
-        calibration_id=_hash([getattr(gauge, name) for gauge in calibrations for name in _OF_CALIBRATION]),
-        stand_id=_hash(
+        budget=(*lines, plate_mass_line),
+        calibration_id=content_hash(
+            [getattr(gauge, name) for gauge in calibrations for name in _OF_CALIBRATION]
+        ),
+        stand_id=content_hash(
             [stand.name, stand.gravity_m_per_s2, device.protocol, device.name, device.serial_number]
         ),
         adequate=model.get("adequate"),
@@ -121,6 +140,28 @@ def run_result(path: Path, metadata: RunMetadata, document: Document) -> RunResu
         msk64_degree=document["results"].get("msk64_degree", ""),
         warnings=tuple(map(read_warning, document["warnings"])),
     )
+
+
+def _with_nominal_rate(lines: Iterable[BudgetLine], period: Quantity | None) -> Iterator[BudgetLine]:
+    """Part the time base: the clock as timed in this run, and the device's nominal rate, alike in all runs.
+
+    With t as timed and p of the nominal rate, u^2 = t^2 p^2 / (t^2 + p^2) of both together holds u^4 / p^2 of
+    the nominal rate (docs/decisions/0006). The period has the relative uncertainty of the clock.
+    """
+    budget = list(lines)
+    clock = (
+        line.standard_uncertainty
+        for line in budget
+        if line.source is BudgetSource.TIME_BASE and line.contribution_to == "period_s"
+    )
+    share = min(1.0, next(clock, 0.0) / period.value / CLOCK_TOLERANCE) if period else 0.0
+    for line in budget:
+        if line.source is BudgetSource.TIME_BASE and share:
+            size = line.standard_uncertainty
+            yield replace(line, standard_uncertainty=size * math.sqrt(1.0 - share**2))
+            yield replace(line, source=BudgetSource.NOMINAL_RATE, standard_uncertainty=size * share)
+        else:
+            yield line
 
 
 def _effects(model: Document) -> tuple[str, ...] | None:
@@ -137,7 +178,3 @@ def series_key(metadata: RunMetadata) -> SeriesKey:
     return SeriesKey(
         metadata.series or "", contact, metadata.pullback_m, metadata.plate_mass_kg, metadata.table_mass_kg
     )
-
-
-def _hash(facts: list[Any]) -> str:
-    return hashlib.blake2b(msgspec.json.encode(facts), digest_size=8).hexdigest()

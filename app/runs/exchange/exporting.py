@@ -8,7 +8,8 @@ import msgspec
 
 from analysis.record import AnalysisError
 from app.runs.analysis_input import to_record
-from app.runs.analyze import AnalysisRequest, analyze_run
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import analyze_run
 from app.runs.disk import atomic_write
 from app.runs.errors import RunError, UnsuitableRunError
 from app.runs.exchange.content import ExportedRun, sample_columns
@@ -141,5 +142,6 @@ def _document(run: Run) -> dict[str, object]:
     in_metres = (run.metadata.quantity, run.metadata.unit) == ("displacement", "m")
     kept = latest_valid(run.analyses, to_record(run, metres_only=in_metres))
     if kept is not None:
-        return kept.document
+        has_gauge_2 = run.relative_reading is not None
+        return kept.document_of(run.path, run.metadata, run.identifier, has_gauge_2=has_gauge_2)
     return analyze_run(run.path, AnalysisRequest(kind="two-mass" if in_metres else "one-mass")).document

@@ -15,7 +15,8 @@ from pullback_kit import follow, recording
 
 from app.acquisition.pullback.plan import PullbackMeasurement, PullbackPlan
 from app.runs.analysis_json import zero_warnings
-from app.runs.analyze import Analysis, AnalysisRequest, analyze_run
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import Analysis, analyze_run
 from app.runs.blocks import CalibratedBlock, RunBlock, calibrate
 from app.runs.metadata import EndMetadata, Events, RunMetadata, create_metadata
 from app.runs.writer import write_run

@@ -164,9 +164,12 @@ def test_a_law_that_the_record_cannot_tell_is_refused_by_its_parameter(slipstand
         (["--table-mass", "nan"], "--table-mass nan"),
         (["--plate-mass", "-3"], "--plate-mass -3"),
         (["--added-mass", "20"], "--added-mass needs"),
-        (["--kind", "one-mass", "--added-mass", "20"], "two runs"),
         (["--added-mass", "0"], "--added-mass 0"),
         (["--added-mass-uncertainty", "0.1"], "goes with --added-mass"),
+        (["--from", "3", "--until", "2"], "--from 3 is not before --until 2"),
+        (["--until", "nan"], "--until nan"),
+        (["--release", "0"], "--release 0"),
+        (["--release", "1", "--kind", "one-mass"], "--release is for two masses"),
         (["--figure", "a.bmp"], "a.bmp"),
     ],
 )
@@ -211,7 +214,57 @@ def test_two_decays_with_a_known_added_mass_give_the_mass_of_the_table(
     assert document["runs"] == [str(alone), str(loaded)]
     assert mass["value"] == pytest.approx(TABLE_KG, abs=4.0 * mass["standard_uncertainty"])
     assert 0.5 * 0.01 * TABLE_KG / ADDED_KG < mass["standard_uncertainty"] < 1.0
-    assert "table mass 131." in slipstand(*asked).out
+    said = slipstand(*asked).out
+    assert "table mass 131." in said
+    assert "beside its own 131.6 kg: stiffness and damping coefficient are those of 151.6 kg" in said
+
+
+def test_stiffness_and_damping_of_a_loaded_table_are_those_of_both_masses(
+    slipstand: Any, tmp_path: Path
+) -> None:
+    alone = bare(slipstand, tmp_path / "alone.h5", TABLE_KG)
+    loaded = bare(slipstand, tmp_path / "loaded.h5", TABLE_KG + ADDED_KG)
+    added = ("--kind", "one-mass", "--added-mass", ADDED_KG)
+    unloaded, of_two, _ = slipstand("analyze", alone, loaded, *added, "--json").json
+    assert "mass-added" not in [warning["code"] for warning in unloaded["warnings"]]
+    (of_one,) = slipstand("analyze", loaded, *added, "--json").json
+    for document in (unloaded, of_two, of_one):
+        results = document["results"]
+        for name, truth in (("stiffness_n_per_m", STIFFNESS), ("damping_coefficient_kg_per_s", DAMPING)):
+            low, high = results[name]["interval_95"]
+            assert low - (high - low) < truth < high + (high - low)
+    assert of_one["results"] == of_two["results"]
+    (unsure,) = slipstand("analyze", loaded, *added, "--added-mass-uncertainty", 5, "--json").json
+    share = unsure["results"]["stiffness_n_per_m"]["standard_uncertainty"] / STIFFNESS
+    assert share == pytest.approx(5.0 / (TABLE_KG + ADDED_KG), rel=0.01)
+
+
+def test_a_span_and_a_release_are_chosen(slipstand: Any, tmp_path: Path) -> None:
+    """Two tests in one record, the table pulled back in 3 s between them; the longer decay comes first."""
+    rate_hz, rng = 250.0, np.random.default_rng(1)
+    first = simulate_readings(Truth(rate_hz=rate_hz, duration_s=12.0))
+    second = simulate_readings(Truth(rate_hz=rate_hz, duration_s=8.0, friction_dynamic=0.15))
+    channels = []
+    for one, other in zip(first[1:], second[1:], strict=True):
+        pulled_m = np.linspace(one[-1], other[0], 750) + 2e-5 * rng.standard_normal(750)
+        channels.append(np.concatenate((one, pulled_m, other)))
+    ended_s = float(first[0][-1])
+    run = stored(slipstand, tmp_path / "two.h5", np.arange(len(channels[0])) / rate_hz, *channels)
+
+    def friction(*chosen: object) -> tuple[float, str]:
+        (document,) = slipstand("analyze", run, *chosen, "--json").json
+        said = {warning["code"]: warning["message"] for warning in document["warnings"]}
+        return document["results"]["friction_dynamic"]["value"], said.get("released-twice", "")
+
+    assert friction()[0] == pytest.approx(0.1, abs=1e-3)
+    assert friction("--release", 1)[0] == pytest.approx(0.1, abs=1e-3)
+    value, said = friction("--release", 2)
+    assert value == pytest.approx(0.15, abs=1e-3)
+    assert "2 times" in said
+    assert "the decay after number 2 is used" in said
+    assert friction("--from", ended_s + 3.0) == (pytest.approx(0.15, abs=1e-3), "")
+    assert friction("--until", ended_s - 1.0) == (pytest.approx(0.1, abs=1e-3), "")
+    assert_one_error_line(slipstand("analyze", run, "--release", 3), "the record has no release 3: 2 were")
 
 
 def test_runs_in_the_wrong_order_give_no_mass(slipstand: Any, tmp_path: Path) -> None:

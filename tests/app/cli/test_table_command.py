@@ -7,7 +7,8 @@ import shutil
 import pytest
 from reports_kit import write_run
 
-from app.runs.analyze import AnalysisRequest, analyze_run
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import analyze_run
 from config.files import published_row
 
 

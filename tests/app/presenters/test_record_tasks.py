@@ -73,7 +73,10 @@ def test_a_kept_run_holds_what_the_command_line_would_have_kept(
         main()
     (here,), (there,) = (open_run(path, trusted=True).analyses for path in (run, other))
     assert here.settings == there.settings
-    assert here.document == there.document | {"run": str(run)}
+    origin = there.document["origin"] | {
+        name: here.document["origin"][name] for name in ("date", "reproduce")
+    }
+    assert here.document == there.document | {"run": str(run), "origin": origin}
     assert here.document["classical"]["period_s"] == pytest.approx(0.32, rel=1e-3)
 
 

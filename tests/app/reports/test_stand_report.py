@@ -13,7 +13,8 @@ from app.reports.figures.plate_figures import PLATE_FIGURES
 from app.reports.figures.run_figures import RunFigureData
 from app.reports.figures.style import print_style
 from app.reports.test_report.run_report import run_sections
-from app.runs.analyze import AnalysisRequest, analyze_run
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import analyze_run
 from app.runs.reader import compute_fingerprint
 
 

@@ -11,7 +11,14 @@ from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarnin
 from app.runs.analysis_input import to_record
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
-from app.runs.saved_analyses import analysis_document, inputs_hash, latest_valid, save_analysis
+from app.runs.saved_analyses import (
+    analysis_document,
+    damaged_analyses,
+    inputs_hash,
+    latest_valid,
+    save_analysis,
+)
+from app.runs.validator import shared_validator
 from app.runs.writer import write_run
 from drivers.samples import Losses
 from messages.message import message
@@ -103,6 +110,38 @@ def test_analyses_are_kept_beside_each_other(run_path):
         assert group["model/adequate"][()]
         assert list(group["budget/source"].asstr()) == ["gauge 1 gain"]
         assert np.isnan(group["tried/bic"][1])
+
+
+def test_an_analysis_that_is_not_what_was_kept_is_not_taken(run_path):
+    run = open_run(run_path)
+    inputs = inputs_hash(to_record(run))
+    for document in (_document(run), _document(run) | {"kind": "again"}):
+        save_analysis(run_path, document, inputs, {"model": "auto"})
+    with h5py.File(run_path, "r+") as file:
+        text = file["entry/analysis_002/document"]
+        text[()] = text[()].replace(b"0.1001", b"0.1991")
+
+    run = open_run(run_path)
+    assert [saved.number for saved in run.analyses] == [1]
+    with h5py.File(run_path) as file:
+        assert damaged_analyses(file) == (2,)
+    summary = shared_validator().validate(run_path)
+    assert (summary.friction_dynamic, summary.damaged_analyses) == (0.1001, 1)
+
+
+def test_an_analysis_of_a_version_without_checksum_is_taken(run_path):
+    run = open_run(run_path)
+    save_analysis(run_path, _document(run), inputs_hash(to_record(run)))
+    with h5py.File(run_path, "r+") as file:
+        for name in ("crc32", "commit", "request_hash", "reproduce"):
+            file["entry/analysis_001"].pop(name, None)
+
+    (saved,) = open_run(run_path).analyses
+    document = saved.document_of(run_path, run.metadata, run.identifier, has_gauge_2=True)
+    origin = document["origin"]
+    assert (origin["version"], origin["commit"]) == (saved.version, None)
+    assert origin["inputs_hash"] == inputs_hash(to_record(run))
+    assert origin["reproduce"] == f"slipstand analyze {run_path}"
 
 
 @pytest.mark.parametrize("change", ["plate_mass_kg", "gauges", "note"])

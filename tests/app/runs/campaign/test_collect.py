@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from analysis.campaign.campaign import Excluded
-from app.runs.analyze import AnalysisRequest
+from app.runs.analysis_request import AnalysisRequest
 from app.runs.batch.executors import ExecutorOptions
 from app.runs.campaign.collect import (
     CollectedRuns,
