@@ -6,6 +6,7 @@ import typer
 from app.cli import output as out
 from app.cli.run_file_options import ExportOptions
 from app.runs.exchange.exporting import ExportRequest, export_runs
+from app.runs.origin import SIMULATED
 
 
 def export(options: ExportOptions) -> None:
@@ -21,6 +22,8 @@ def export(options: ExportOptions) -> None:
             out.print_status(f"error: {outcome.error}")
         elif outcome.note:
             out.print_status(f"{outcome.run}: {outcome.note}")
+        if outcome.is_simulated:
+            out.print_status(f"{outcome.run}: {SIMULATED}, of a simulated stand and not of a real one")
     if options.as_json:
         texts = [{"error": str(outcome.error), "note": str(outcome.note)} for outcome in outcomes]
         documents = [msgspec.to_builtins(outcome) for outcome in outcomes]

@@ -3,12 +3,13 @@
 import datetime
 
 from app.cli import output as out
-from app.cli.campaigns import exit_with_failures, load_campaign
+from app.cli.campaigns import absolute_paths, exit_with_failures, load_campaign
 from app.cli.errors import CommandError
 from app.cli.result_options import ReportOptions
 from app.reports.table.text import TableContent
 from app.reports.test_report.build import TITLE, ReportHead, build_report
 from app.reports.test_report.render import write_report
+from app.runs.analysis_request import quote_command
 
 
 def report(options: ReportOptions) -> None:
@@ -18,16 +19,27 @@ def report(options: ReportOptions) -> None:
     if not runs.runs:
         fault = runs.failures[0].error if runs.failures else "all are left out"
         raise CommandError(f"none of the runs gives a result: {fault}")
-    content = TableContent.of_runs(runs)
+    content = TableContent.of_runs(runs, _reproduce(options, head))
     made = build_report(runs, content, head)
     write_report(made, target, replace=options.force)
     if options.as_json:
         failures = [{"run": run, "error": error} for run, error in content.failures]
         names = [run.name for run in runs.runs]
-        out.print_json({"report": str(target), "date": made.date, "runs": names, "failures": failures})
+        document = {"report": str(target), "date": made.date, "runs": names, "failures": failures}
+        out.print_json(document | {"origin": content.origin.document()})
     else:
         out.print_line(str(target))
     exit_with_failures(runs)
+
+
+def _reproduce(options: ReportOptions, head: ReportHead) -> str:
+    """Command that gives the same report, of the runs as they are."""
+    words = ["--date", head.date.isoformat()]
+    words += ["--title", options.title] if options.title else []
+    words += ["--laboratory", options.laboratory] if options.laboratory else []
+    words += [word for run in options.exclude or () for word in ("--exclude", run)]
+    paths = absolute_paths(options.paths)
+    return quote_command(["slipstand", "report", *paths, "-o", "REPORT.pdf", *words])
 
 
 def _head(date: str, title: str, laboratory: str) -> ReportHead:

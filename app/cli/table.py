@@ -11,11 +11,12 @@ from analysis.audit import PublishedRow, audit
 from analysis.campaign.campaign import Campaign, compare_with_published
 from analysis.catalogue import optional_columns
 from app.cli import output as out
-from app.cli.campaigns import exit_with_failures, load_campaign
+from app.cli.campaigns import absolute_paths, exit_with_failures, load_campaign
 from app.cli.errors import CommandError
 from app.cli.result_options import TableOptions
 from app.reports.table.files import as_text, write_table
 from app.reports.table.text import PublishedRowComparison, TableContent, note_sections
+from app.runs.analysis_request import quote_command
 from config.files import load_stand, published_table
 
 _WIDTH_MIN, _UNLIMITED = 40, 1_000_000  # columns of a narrow terminal, and of a pipe
@@ -26,7 +27,8 @@ def table(options: TableOptions) -> None:
     target = out.output_file(options.output, options.force) if options.output else None
     columns = _columns(options.column)
     runs = load_campaign(options.paths, options.jobs, exclude=options.exclude, save=options.save)
-    content = TableContent.of_runs(runs, _published(runs.campaign()) if options.published else None)
+    published = _published(runs.campaign()) if options.published else None
+    content = TableContent.of_runs(runs, _reproduce(options), published)
     content = replace(content, columns=columns)
     if target is not None:
         write_table(content, target, name, with_repeats=options.repeats, replace=options.force)
@@ -39,6 +41,14 @@ def table(options: TableOptions) -> None:
             for sentence in sentences:
                 out.print_status(f"{title}: {sentence}")
     exit_with_failures(runs)
+
+
+def _reproduce(options: TableOptions) -> str:
+    """Command that gives the same table, of the runs as they are."""
+    chosen = {"--column": options.column, "--exclude": options.exclude}
+    words = [word for name, values in chosen.items() for value in values or () for word in (name, value)]
+    words += ["--published"] if options.published else []
+    return quote_command(["slipstand", "table", *absolute_paths(options.paths), *words])
 
 
 def _format(name: str, output: Path | None, *, as_json: bool) -> str:

@@ -17,7 +17,7 @@ from config.schema import Filter, Gauge
 Document = dict[str, Any]
 SIMULATED: Final = "SIMULATED"
 """Stands beside every result of a run that no real stand has made."""
-_GAUGES: Final = {"table": "gauge 1", "relative": "gauge 2"}
+GAUGES: Final = {"table": "gauge 1", "relative": "gauge 2"}
 
 
 def program_document() -> Document:
@@ -59,7 +59,7 @@ def analysis_origin(
         },
         "gravity_m_per_s2": stand.gravity_m_per_s2,
         "gravity_standard_uncertainty_m_per_s2": stand.gravity_standard_uncertainty_m_per_s2,
-        "calibrations": dict(zip(_GAUGES, map(calibration_document, gauges), strict=False)),
+        "calibrations": dict(zip(GAUGES, map(calibration_document, gauges), strict=False)),
         "reproduce": request.command(path.absolute()),
     }
 
@@ -82,12 +82,11 @@ def origin_rows(origin: Document) -> Iterator[tuple[str, str]]:
     yield "analysed", origin["date"]
     file = origin["source_file"]
     yield "source", origin["source"] + (f" from {file['name']}, SHA-256 {file['sha256']}" if file else "")
-    asked = ", ".join(f"{name} {value}" for name, value in origin["request"].items())
-    yield "request", f"{asked} ({origin['request_hash']})"
+    yield "request", request_text(origin)
     yield "inputs", origin["inputs_hash"]
     yield "masses", masses_text(origin)
     for name, gauge in origin["calibrations"].items():
-        yield _GAUGES[name], calibration_text(gauge)
+        yield GAUGES[name], calibration_text(gauge)
     yield "reproduce", origin["reproduce"]
 
 
@@ -95,6 +94,12 @@ def software_text(origin: Document) -> str:
     """Program with version and commit: `slipstand 0.1.0 (229b00461f68)`."""
     made_of = f" ({origin['commit']})" if origin.get("commit") else ""
     return f"{origin['program']} {origin['version']}{made_of}"
+
+
+def request_text(origin: Document) -> str:
+    """What was asked for, with its identity: `model auto, kind two-mass (01e7b720ff566d53)`."""
+    asked = ", ".join(f"{name} {value}" for name, value in origin["request"].items())
+    return f"{asked} ({origin['request_hash']})"
 
 
 def masses_text(origin: Document) -> str:

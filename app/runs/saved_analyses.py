@@ -35,7 +35,7 @@ from app.runs.fields import (
 )
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_metadata
-from app.runs.origin import analysis_origin
+from app.runs.origin import analysis_origin, software_text
 from app.runs.rewrite import rewrite
 from app.version import __version__
 from config.schema import Gauge
@@ -62,6 +62,11 @@ class SavedAnalysis:
     request_hash: str = ""
     reproduce: str = ""
     """Command that gives the same digits; these three are empty in analyses of versions that kept none."""
+
+    @property
+    def program_text(self) -> str:
+        """Program that made it, with version and commit."""
+        return software_text({"program": "slipstand", "version": self.version, "commit": self.commit})
 
     def document_of(
         self, path: Path, metadata: RunMetadata, identifier: str, *, has_gauge_2: bool

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from analysis.synthetic import Truth, simulate_readings
-from app.runs.metadata import create_metadata
+from app.runs.metadata import RunSource, create_metadata
 from app.runs.simulated import store_motion
 from config.files import load_gauges, load_stand, published_row
 
@@ -40,6 +40,7 @@ def write_run(
         series=series,
         rate_hz=truth.rate_hz,
         source="simulated",
+        stated_source=RunSource.SIMULATED,
         **facts or {},
     )
     readings = np.column_stack([table, relative])

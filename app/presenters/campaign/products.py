@@ -11,6 +11,7 @@ from app.reports.table.files import write_table
 from app.reports.table.text import TableContent
 from app.reports.test_report.build import TITLE, ReportHead, build_report
 from app.reports.test_report.render import write_report
+from app.runs.analysis_request import quote_command
 from app.runs.campaign.collect import CollectedRuns
 from messages.i18n import gettext, translate
 from messages.message import Message
@@ -30,7 +31,8 @@ def write_product(
     report(Progress(gettext("Writing {file}", file=target.name)))
     if product is Product.FIGURES:
         return _write_figures(target, runs, report)
-    content = TableContent.of_runs(runs)
+    command = "table" if product is Product.TABLE else "report"
+    content = TableContent.of_runs(runs, quote_command(["slipstand", command, folder]))
     if product is Product.TABLE:
         name = _TABLE_FORMATS.get(target.suffix.lower(), "text")
         write_table(content, target, name, with_repeats=True, replace=True)

@@ -74,7 +74,7 @@ def write_workbook(content: TableContent, path: Path, *, replace: bool = False) 
     """
     notes = ((title, sentence) for title, sentences in note_sections(content) for sentence in sentences)
     sheets: dict[str, Sheet] = {
-        "Table 1": _main_grid(content),
+        "Table 1": _main_grid_with_warning(content),
         "Numbers": flat_table(content),
         "Repeats": repeats_grid(content),
         "Notes": (("about", "sentence"), notes),
@@ -89,8 +89,16 @@ def _main_grid(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, 
     return table_headers(content.columns), [row_cells(row, content.columns) for row in content.campaign.rows]
 
 
+def _main_grid_with_warning(content: TableContent) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    header, rows = _main_grid(content)
+    warning = content.origin.warning
+    return header, [*rows, (warning,)] if warning else rows
+
+
 def _markdown(content: TableContent, with_repeats: bool) -> str:
-    lines = [*_markdown_table(*_main_grid(content)), "", LEGEND]
+    warning = content.origin.warning
+    lines = [f"**{_marked(warning)}**", ""] if warning else []
+    lines += [*_markdown_table(*_main_grid(content)), "", LEGEND]
     if with_repeats:
         lines += ["", "## Repeats", "", *_markdown_table(*repeats_grid(content))]
     if content.published is not None:
@@ -120,6 +128,7 @@ def _latex(content: TableContent) -> str:
         r"\toprule",
         " & ".join(("Series", "$n$", *columns)) + r" \\",
         r"\midrule",
+        *_latex_warning(content.origin.warning, len(columns) + 2),
         *(" & ".join(map(_latex_cell, cells)) + r" \\" for cells in _main_grid(content)[1]),
         r"\bottomrule",
         r"\end{tabular}",
@@ -128,6 +137,11 @@ def _latex(content: TableContent) -> str:
     for title, sentences in note_sections(content):
         lines += [f"% {title}: {' '.join(sentence.split())}" for sentence in sentences]
     return "\n".join(lines) + "\n"
+
+
+def _latex_warning(text: str, columns: int) -> list[str]:
+    """Row that says of what the table is not, where that must be said in print."""
+    return [rf"\multicolumn{{{columns}}}{{l}}{{\textbf{{{escape_latex(text)}}}}} \\"] if text else []
 
 
 def _latex_cell(text: str) -> str:
@@ -151,6 +165,7 @@ def flat_table(content: TableContent) -> tuple[list[str], list[list[Any]]]:
     header = [*_LEADING, *names, "msk64_degree", "warnings"]
     if content.published is not None:
         header += [f"{column.name}{fact}" for column in table_quantities() for fact in _PUBLISHED] + ["flags"]
+    header += content.origin.facts_of(()).keys()
     return header, [list(_flat_row(row, content)) for row in content.campaign.rows]
 
 
@@ -175,6 +190,7 @@ def _flat_row(row: SeriesRow, content: TableContent) -> Iterator[Any]:
         for column in table_quantities():
             yield from figures.get(column.name, (None, None))
         yield ", ".join(printed.flags) if printed else None
+    yield from content.origin.facts_of(row.runs).values()
 
 
 SCHEMA: Final = "slipstand-table/1"
@@ -185,7 +201,11 @@ def table_document(content: TableContent) -> dict[str, Any]:
     campaign = content.campaign
     return {
         "schema": SCHEMA,
-        "rows": [_row_document(row, (content.published or {}).get(row.label)) for row in campaign.rows],
+        "rows": [
+            _row_document(row, (content.published or {}).get(row.label))
+            | {"source": content.origin.source_of(row.runs)}
+            for row in campaign.rows
+        ],
         "effects": [_effect_document(effect) for effect in campaign.effects.effects],
         "scatter_beyond_effects": campaign.effects.scatter,
         "effects_of_stand": effect_documents(campaign.effects_of_stand),
@@ -194,6 +214,7 @@ def table_document(content: TableContent) -> dict[str, Any]:
         "excluded": msgspec.to_builtins(campaign.excluded),
         "failures": [{"run": run, "error": error} for run, error in content.failures],
         "warnings": warning_documents(content.all_warnings()),
+        "origin": content.origin.document(),
     }
 
 

@@ -21,6 +21,7 @@ from analysis.formatting import (
 )
 from analysis.quantities import Quantity, ResultWarning
 from app.runs.campaign.collect import CollectedRuns
+from app.runs.campaign.origin import CampaignOrigin
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,13 +38,20 @@ class TableContent:
     published: Mapping[str, PublishedRowComparison] | None = field(default=None)
     """By the labels of the rows; None where not asked for."""
     columns: tuple[str, ...] = ()  # optional ones that are shown
+    origin: CampaignOrigin = field(default_factory=CampaignOrigin)
 
     @classmethod
     def of_runs(
-        cls, runs: CollectedRuns, published: Mapping[str, PublishedRowComparison] | None = None
+        cls,
+        runs: CollectedRuns,
+        reproduce: str,
+        published: Mapping[str, PublishedRowComparison] | None = None,
     ) -> "TableContent":
+        """Content of a table or a report of runs, which the command `reproduce` gives again."""
         failures = tuple((failure.run, str(failure.reason)) for failure in runs.failures)
-        return cls(runs.campaign(), runs.warnings, failures, published)
+        counted = {run.name: runs.details[run.name] for run in runs.runs if not run.excluded}
+        origin = CampaignOrigin.of_runs(counted, reproduce)
+        return cls(runs.campaign(), runs.warnings, failures, published, origin=origin)
 
     def all_warnings(self) -> list[ResultWarning]:
         of_rows = [caution for row in self.campaign.rows for caution in row.warnings]
@@ -54,6 +62,8 @@ def has_inadequate_run(row: SeriesRow) -> bool:
     return any(caution.code == "not-adequate" for caution in row.warnings)
 
 
+ORIGIN: Final = "Origin"
+"""Title of the last of the notes."""
 OUTLIER, INADEQUATE, FRICTION_HOLDS = "*", "!", "~"
 
 
@@ -134,6 +144,8 @@ _PUBLISHED_LEGEND: Final = "Measured minus published, with the published c read 
 def text_lines(content: TableContent, width: int, *, with_repeats: bool = False) -> Iterator[str]:
     """Lines of the table and its notes, of at most `width` characters where words allow it."""
     rows = [row_cells(row, content.columns) for row in content.campaign.rows]
+    if warning := content.origin.warning:
+        yield from (*_wrapped(warning, width), "")
     yield from blocks(table_headers(content.columns), rows, width)
     yield from ("", *_wrapped(LEGEND, width))
     if with_repeats:
@@ -145,7 +157,8 @@ def text_lines(content: TableContent, width: int, *, with_repeats: bool = False)
     for title, sentences in note_sections(content):
         yield from ("", title)
         for sentence in sentences:
-            yield from _wrapped(sentence, width, "- ")
+            is_command = title == ORIGIN and sentence is sentences[-1]  # which is copied from one line
+            yield from [f"- {sentence}"] if is_command else _wrapped(sentence, width, "- ")
 
 
 def note_sections(content: TableContent) -> list[tuple[str, list[str]]]:
@@ -161,6 +174,7 @@ def note_sections(content: TableContent) -> list[tuple[str, list[str]]]:
         ("Runs that do not count", [f"{one.run}: {one.reason}" for one in campaign.excluded]),
         ("Runs without a result", [f"{run}: {reason}" for run, reason in content.failures]),
         ("Warnings", list(_warnings(content))),
+        (ORIGIN, list(content.origin.sentences())),
     )
     return [(title, kept) for title, some in every if (kept := [sentence for sentence in some if sentence])]
 

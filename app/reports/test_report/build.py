@@ -3,6 +3,7 @@
 import datetime
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -12,11 +13,12 @@ from app.reports.table.text import TableContent
 from app.reports.test_report.blocks import Report, Section
 from app.reports.test_report.campaign_report import CampaignReportInput, campaign_sections
 from app.reports.test_report.run_report import run_sections
+from app.runs.analysis_request import quote_command
 from app.runs.analyze import repeat_saved_analysis
 from app.runs.campaign.collect import CollectedRuns
+from app.runs.origin import program_document, software_text
 from app.runs.reader import compute_fingerprint
 from app.runs.validator import Validator
-from app.version import __version__
 
 TITLE = "Test report: dry friction by pullback"
 
@@ -35,7 +37,8 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
     with Validator() as validator:
         if len(gathered.runs) == 1 and not (gathered.failures or gathered.excluded):
             (run,) = gathered.runs
-            return _run_report(Path(run.name), head, validator, run.excluded)
+            return _run_report(Path(run.name), head, validator, content.origin.reproduce, run.excluded)
+        content = replace(content, origin=content.origin.dated(head.date.isoformat()))
         chosen = representative_runs(content.campaign, gathered.runs) if content.campaign.rows else []
         material = CampaignReportInput(
             content,
@@ -50,22 +53,25 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
 
 def build_run_report(path: Path, head: ReportHead) -> Report:
     """Build the report of one run. Raises RunError, AnalysisError."""
+    words = ["slipstand", "report", str(path.absolute()), "-o", "REPORT.pdf", "--date", head.date.isoformat()]
     with Validator() as validator:
-        return _run_report(path, head, validator)
+        return _run_report(path, head, validator, quote_command(words))
 
 
-def _run_report(path: Path, head: ReportHead, validator: Validator, excluded: str = "") -> Report:
+def _run_report(
+    path: Path, head: ReportHead, validator: Validator, reproduce: str, excluded: str = ""
+) -> Report:
     """Build the report of a run; `excluded` is why it does not count, where the run does not say so."""
     analysis = repeat_saved_analysis(path, validator)
     metadata = analysis.run.metadata
     subtitle = f"{metadata.series}, {path.name}" if metadata.series else path.name
-    sections = run_sections(analysis, compute_fingerprint(path), excluded or metadata.excluded)
+    sections = run_sections(analysis, compute_fingerprint(path), reproduce, excluded or metadata.excluded)
     return _report(head, subtitle, sections)
 
 
 def _report(head: ReportHead, subtitle: str, sections: list[Section]) -> Report:
-    date, software = head.date.isoformat(), f"Slipstand {__version__}"
-    return Report(head.title, subtitle, head.laboratory, date, software, sections)
+    software = software_text(program_document()).capitalize()
+    return Report(head.title, subtitle, head.laboratory, head.date.isoformat(), software, sections)
 
 
 def _folder(names: Sequence[str]) -> str:

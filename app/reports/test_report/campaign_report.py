@@ -16,6 +16,7 @@ from app.reports.figures.run_figures import CAPTION, contact_names, friction_fig
 from app.reports.figures.style import print_style
 from app.reports.table.text import (
     LEGEND,
+    ORIGIN,
     REPEATS_LEGEND,
     TableContent,
     note_sections,
@@ -58,7 +59,7 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
     scatter: list[list[Cell]] = [list(row) for row in repeats_grid(material.content)[1]]
     repeats = blocks.Grid(["series", *no_units], scatter, len(no_units), small=True, note=REPEATS_LEGEND)
     return [
-        Section("Campaign", [_summary(material)]),
+        Section("Campaign", [*_simulated(material), _summary(material)]),
         *_notes(material),
         Section("Table of results", [results], wide=True),
         Section("Uncertainty of the dynamic friction coefficient", list(_budget(material)), wide=True),
@@ -69,6 +70,7 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
         shared.PROCEDURE,
         Section("Runs", [_runs(material)], wide=True),
         Section("Data", shared.fingerprint_columns(prints)),
+        Section(ORIGIN, [blocks.Points(list(material.content.origin.sentences()))]),
         shared.SIGNATURES,
     ]
 
@@ -94,9 +96,14 @@ def _summary(material: CampaignReportInput) -> blocks.Facts:
     return shared.without_empty(rows)
 
 
+def _simulated(material: CampaignReportInput) -> Iterator[blocks.Block]:
+    if warning := material.content.origin.warning:
+        yield blocks.Notice(warning)
+
+
 def _notes(material: CampaignReportInput) -> Iterator[Section]:
-    """The notes of the table; two of them appear even if they are empty."""
-    notes = dict(note_sections(material.content))
+    """The notes of the table but for its origin; two of them appear even if they are empty."""
+    notes = {title: texts for title, texts in note_sections(material.content) if title != ORIGIN}
     for title in dict.fromkeys((*notes, *_ALWAYS_SHOWN)):
         texts = [typeset_sentence(_local(text, material)) for text in notes.get(title, ())]
         yield Section(title, [blocks.Points(texts) if texts else Text("None.")])

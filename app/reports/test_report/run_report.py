@@ -23,10 +23,12 @@ from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from analysis.verdict_text import EFFECT_TITLES, describe_verdict, model_title
 from app.reports.figures.record_figure import record_figure
 from app.reports.figures.style import print_style
+from app.reports.table.text import ORIGIN
 from app.reports.test_report import blocks, shared
 from app.reports.test_report.blocks import Cell, Section, Text
 from app.runs.analyze import Analysis
 from app.runs.metadata import Conditions, RunMetadata
+from app.runs.origin import SIMULATED, is_simulated, origin_rows
 from app.runs.reader import Fingerprint
 from drivers.samples import Losses
 
@@ -41,8 +43,13 @@ _ENDINGS: Final = {
 }
 
 
-def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str = "") -> list[Section]:
-    """All sections of the report of one run; `excluded` is why it does not count."""
+def run_sections(
+    analysis: Analysis, print_of_file: Fingerprint, reproduce: str, excluded: str = ""
+) -> list[Section]:
+    """All sections of the report of one run, which the command `reproduce` gives again.
+
+    `excluded` is why the run does not count.
+    """
     found, run = analysis.identification, analysis.run
     of_stand: list[str] = []
     warnings: list[str] = []
@@ -52,7 +59,7 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
     sums = ", ".join(f"{name} {value}" for name, value in print_of_file.columns.items())
     columns = [("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)]
     return [
-        Section("Result", [*_notices(found, excluded), *_result(found, run.metadata.unit)]),
+        Section("Result", [*_notices(analysis, excluded), *_result(found, run.metadata.unit)]),
         Section("Test", [_test(analysis)]),
         Section("Conditions", [_conditions(run.metadata)]),
         shared.stand_section([run.metadata.stand]),
@@ -64,16 +71,19 @@ def run_sections(analysis: Analysis, print_of_file: Fingerprint, excluded: str =
         Section("Figures", _figures(analysis)),
         Section("Warnings", [blocks.Points(warnings) if warnings else Text("None.")]),
         Section("Data", [*shared.fingerprint_columns([print_of_file]), shared.without_empty(columns)]),
+        Section(ORIGIN, [_origin(analysis, reproduce)]),
         shared.SIGNATURES,
     ]
 
 
-def _notices(found: Identification, excluded: str) -> Iterator[blocks.Block]:
-    """Notices above the result: an exclusion, and an expired calibration, which affects every result."""
+def _notices(analysis: Analysis, excluded: str) -> Iterator[blocks.Block]:
+    """Notices above the result: that it is simulated, an exclusion, and an expired calibration."""
+    if is_simulated(analysis.document["origin"]):
+        yield blocks.Notice(f"{SIMULATED}: this run is of a simulated stand, not of a real one.")
     if excluded:
         left_out = f"This run is left out of the campaign's results: {excluded}."
         yield blocks.Notice(f"{left_out} What follows is for information only.")
-    for warning in found.warnings:
+    for warning in analysis.identification.warnings:
         if warning.code == "calibration-expired":
             yield blocks.Notice(str(warning.message), "warn")
 
@@ -140,6 +150,18 @@ def _samples(losses: Losses) -> str:
         f"{count} {name}" for name in ("missing", "damaged", "overloaded") if (count := getattr(losses, name))
     ]
     return f"{losses.samples}, of which {', '.join(faults) if faults else 'none missing or damaged'}"
+
+
+def _origin(analysis: Analysis, reproduce: str) -> blocks.Facts:
+    """Origin of the results; the same for every report of the run, whenever it is made."""
+    rows = dict(origin_rows(analysis.document["origin"]))
+    del rows["analysed"]
+    kept = analysis.repeats
+    if kept is not None:
+        rows["kept"] = (
+            f"as analysis {kept.number} of the run, {kept.date.isoformat()}, by {kept.program_text}"
+        )
+    return blocks.Facts([*rows.items(), ("this report", reproduce)])
 
 
 def _conditions(metadata: RunMetadata) -> blocks.Facts:

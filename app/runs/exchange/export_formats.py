@@ -17,6 +17,8 @@ from analysis.formatting import format_value
 from app.runs.errors import UnsuitableRunError
 from app.runs.exchange import content, ro_crate, uff58
 from app.runs.exchange.content import COEFFICIENT_COLUMNS, ExportedRun, SampleColumn
+from app.runs.metadata import RunSource
+from app.runs.origin import SIMULATED, origin_rows
 
 # --- CSV ---------------------------------------------------------------------------------
 
@@ -258,11 +260,22 @@ def _write_latex(runs: Iterable[ExportedRun], path: Path) -> None:
         r"\toprule",
         " & ".join(header) + r" \\",
         r"\midrule",
-        *(" & ".join(_latex_row(exported)) + r" \\" for exported in runs),
+        *(line for exported in runs for line in _latex_lines(exported)),
         r"\bottomrule",
         r"\end{tabular}",
     ]
     path.write_text("\n".join(lines) + "\n", "utf-8")
+
+
+def _latex_lines(exported: ExportedRun) -> Iterator[str]:
+    """Row of a run, with its origin as a comment; a simulated one is called so in print."""
+    origin = (exported.analysis or {}).get("origin")
+    cells = " & ".join(_latex_row(exported))
+    if exported.run.metadata.source_type is RunSource.SIMULATED:
+        cells = cells.replace(" & ", rf" \textbf{{{SIMULATED}}} & ", 1)
+    yield cells + r" \\"
+    if origin is not None:
+        yield from (f"% {name}: {text}" for name, text in origin_rows(origin))
 
 
 def escape_latex(text: str) -> str:

@@ -19,6 +19,7 @@ from app.runs.exchange.export_formats import (
     unique_names,
     write_csv_coefficients,
 )
+from app.runs.metadata import RunSource
 from app.runs.reader import Run, open_run
 from app.runs.saved_analyses import latest_valid
 from app.runs.validator import Validator
@@ -66,6 +67,7 @@ class ExportOutcome(msgspec.Struct, frozen=True):
     files: list[str] = []
     error: Message = EMPTY
     note: Message = EMPTY
+    is_simulated: bool = False
 
 
 def _load(path: Path, request: ExportRequest, validator: Validator) -> tuple[ExportedRun, Message]:
@@ -119,7 +121,9 @@ def export_runs(
                     gathered.append(exported)
                 else:
                     files = write_exported_run(request.format, exported, target, replace=request.replace)
-                outcomes.append(ExportOutcome(str(path.absolute()), list(map(str, files)), note=note))
+                simulated = exported.run.metadata.source_type is RunSource.SIMULATED
+                names = list(map(str, files))
+                outcomes.append(ExportOutcome(str(path.absolute()), names, note=note, is_simulated=simulated))
             except (RunError, AnalysisError) as error:
                 outcomes.append(ExportOutcome(str(path.absolute()), error=message_of(error)))
     if gathered and request.writer.write_coefficients is not None:

@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.runs.exchange.content import ExportedRun, SampleColumn
+from app.runs.metadata import RunSource
+from app.runs.origin import SIMULATED
 
 _TIME_RESPONSE = 1
 _DOUBLE = 4
@@ -58,8 +60,9 @@ def _identification(exported: ExportedRun, channel: SampleColumn) -> tuple[str, 
     friction = "NONE"
     if f_d is not None:
         friction = f"f_d = {f_d['value']:.6g}, standard uncertainty {f_d['standard_uncertainty']:.2g}"
+    simulated = f"{SIMULATED} " if metadata.source_type is RunSource.SIMULATED else ""
     return (
-        metadata.title,
+        simulated + metadata.title,
         channel.name,
         metadata.format_start("%d-%b-%y    %H:%M:%S") or "NONE",
         f"{exported.name} {metadata.series or ''}".strip(),

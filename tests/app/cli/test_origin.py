@@ -1,5 +1,6 @@
 """Origin of results: what made them, of what, and a command that gives the same digits."""
 
+import csv
 import shlex
 import shutil
 from pathlib import Path
@@ -9,6 +10,8 @@ import h5py
 import pytest
 from cli_kit import assert_one_error_line
 
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import analyze_run
 from app.version import __version__, commit
 
 
@@ -124,3 +127,59 @@ def test_the_part_of_a_record_that_is_asked_for_has_to_be_there(
     slipstand: Any, run: Path, part: list[str], said: str
 ) -> None:
     assert_one_error_line(slipstand("analyze", run, *part), said)
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory, short_runs: list[Path]) -> Path:
+    """A simulated run with a kept result, and one without."""
+    folder = tmp_path_factory.mktemp("two runs")
+    for run in short_runs:
+        shutil.copy(run, folder)
+    analyze_run(folder / short_runs[0].name, AnalysisRequest("coulomb"), save=True)
+    return folder
+
+
+def test_a_table_names_the_origin_of_every_result_and_its_command_gives_the_same_digits(
+    slipstand: Any, campaign: Path
+) -> None:
+    excluded = sorted(campaign.iterdir())[1].name
+    table = slipstand("table", campaign, "--exclude", f"{excluded}=plate was dirty", "--json").json
+    origin = table["origin"]
+    assert (origin["version"], origin["commit"]) == (__version__, commit() or None)
+    (run,) = origin["runs"]
+    assert (run["analysis"], run["request"], run["source"]) == (
+        1, {"model": "coulomb", "kind": "two-mass"}, "simulated",
+    )  # fmt: skip
+    assert set(run["calibrations"].values()) == origin["calibrations"].keys()
+    again = repeated(slipstand, origin["reproduce"], "--json").json
+    assert again | {"origin": {}} == table | {"origin": {}}
+    assert again["origin"]["inputs_hash"] == origin["inputs_hash"]
+
+
+@pytest.mark.parametrize("name", ["text", "markdown", "latex", "csv"])
+def test_a_table_of_simulated_runs_says_so(slipstand: Any, campaign: Path, name: str) -> None:
+    said = slipstand("table", campaign, "--format", name).out
+    assert "SIMULATED: 2 of 2 runs" in said or said.count("simulated") == 2
+    assert f"slipstand table '{campaign}'" in said
+
+
+def test_a_report_is_repeated_to_the_byte(slipstand: Any, campaign: Path, tmp_path: Path) -> None:
+    path, again = tmp_path / "report.pdf", tmp_path / "again.pdf"
+    head = ("--title", "On friction", "--laboratory", "Ours")
+    origin = slipstand("report", campaign, "-o", path, *head, "--json").json["origin"]
+    assert repeated(slipstand, origin["reproduce"].replace("REPORT.pdf", str(again))).code == 0
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_exported_coefficients_name_their_origin(slipstand: Any, run: Path, tmp_path: Path) -> None:
+    slipstand("analyze", run, "--model", "coulomb", "--save")
+    path = tmp_path / "found.csv"
+    exported = slipstand("export", run, "--format", "csv", "--content", "coefficients", "-o", path)
+    assert "SIMULATED" in exported.err
+    with path.open(newline="") as file:
+        row = next(row for row in csv.DictReader(file) if row["quantity"] == "friction_dynamic")
+    assert (row["source"], row["masses"]) == ("simulated", "m1 131.6 kg, m2 22.4 kg, g 9.81 m/s²")
+    assert row["calibrations"].startswith("gauge 1 ")
+    (again,) = repeated(slipstand, row["reproduce"], "--json").json
+    assert again["results"]["friction_dynamic"]["value"] == float(row["value"])
+    assert again["origin"]["inputs_hash"] == row["inputs_hash"]

@@ -31,7 +31,8 @@ def analysis(tmp_path_factory):
 def sections_of(analysis, **changes):
     model = replace(analysis.identification.model, **changes)
     found = replace(analysis.identification, model=model)
-    sections = run_sections(replace(analysis, identification=found), compute_fingerprint(analysis.run.path))
+    changed = replace(analysis, identification=found)
+    sections = run_sections(changed, compute_fingerprint(analysis.run.path), "slipstand report")
     return {section.title: section.blocks for section in sections}
 
 
@@ -41,7 +42,7 @@ def sections(analysis):
 
 
 def test_the_verdict_names_the_effects_and_the_section_about_the_stand_their_sizes(analysis, sections):
-    conclusion = sections["Result"][0]
+    conclusion = sections["Result"][1]
     assert analysis.identification.model.degree is Degree.STAND
     assert conclusion.tone == "ok"
     assert "on a stand with a viscous film + a slow release" in conclusion.text
@@ -69,7 +70,7 @@ def test_models_are_told_apart_by_their_effects(analysis, sections):
 )
 def test_a_model_that_fails_says_how_far(analysis, degree, tone, verdict):
     sections = sections_of(analysis, degree=degree, adequate=False, residual_share=0.0025)
-    conclusion = sections["Result"][0]
+    conclusion = sections["Result"][1]
     assert conclusion.tone == tone
     assert conclusion.text.startswith("No model explains the record (0.25 % of the swing is left)")
     assert verdict in conclusion.text

@@ -9,7 +9,6 @@ import msgspec
 import pytest
 from reports_kit import write_run
 
-from analysis.campaign.campaign import summarize
 from analysis.formatting import typeset_sentence
 from app.reports.table.text import TableContent
 from app.reports.test_report.blocks import (
@@ -29,6 +28,7 @@ from app.reports.test_report.render import printable, render_pdf, typeset_report
 from app.runs.analyze import repeat_saved_analysis
 from app.runs.campaign.collect import CollectOptions, collect_runs
 from app.runs.errors import RunExistsError
+from app.version import __version__, commit
 
 HEAD = ReportHead(datetime.date(2026, 11, 21), laboratory="Laboratory of Mechanics")
 NOTE = '#panic("no") *bold* _it_ $x$ <label> @ref \\ // `raw` [a](b) 1. = Head'
@@ -49,9 +49,7 @@ def folder(tmp_path_factory):
 
 def made(*paths, excluded=None):
     gathered = collect_runs(paths, CollectOptions(excluded=excluded or {}))
-    campaign = summarize(gathered.runs)
-    failures = tuple((failure.run, failure.error) for failure in gathered.failures)
-    return build_report(gathered, TableContent(campaign, gathered.warnings, failures), HEAD)
+    return build_report(gathered, TableContent.of_runs(gathered, "slipstand report RUNS"), HEAD)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +77,7 @@ def text_of(report):
 
 def test_report_of_a_run_that_does_not_count_says_so_first(folder):
     report = made(folder / "b.h5", excluded={str(folder / "b.h5"): "gauge 2 was touched"})
-    notice = report.sections[0].blocks[0]
+    _, notice, *_ = report.sections[0].blocks
 
     assert isinstance(notice, Notice)
     assert "left out" in notice.text
@@ -89,7 +87,7 @@ def test_report_of_a_run_that_does_not_count_says_so_first(folder):
 
 def test_report_of_a_run_says_what_was_found(of_run, folder):
     found = repeat_saved_analysis(folder / "a.h5").identification
-    (verdict, _) = part(of_run, "Result")
+    (_, verdict, _) = part(of_run, "Result")
     (results, _, tried) = part(of_run, "Results")
     rows = {row[0]: row[2:4] for row in results.rows}
 
@@ -103,6 +101,21 @@ def test_report_of_a_run_says_what_was_found(of_run, folder):
     )
     assert [row[0] for row in tried.rows] == [law.name for law in found.model.tried]
     assert of_run.subtitle == "1FFM0, a.h5"
+
+
+def test_reports_of_simulated_runs_say_so_first_and_name_their_origin(of_run, of_campaign):
+    for report in (of_run, of_campaign):
+        first = report.sections[0].blocks[0]
+        assert isinstance(first, Notice)
+        assert first.text.startswith("SIMULATED: ")
+    (facts,) = part(of_run, "Origin")
+    rows = dict(facts.rows)
+    assert rows["program"] == f"slipstand {__version__}" + (f" ({commit()})" if commit() else "")
+    assert rows["gauge 1"].startswith("SIM-1 of 2026-01-12 (")
+    assert rows["this report"] == "slipstand report RUNS"
+    (points,) = part(of_campaign, "Origin")
+    assert points.texts[-1] == "Reproduce: slipstand report RUNS"
+    assert any("m2 22.4 kg, g 9.81" in text for text in points.texts)
 
 
 def test_report_of_a_run_says_whether_friction_depends_on_velocity(of_run):
@@ -152,7 +165,7 @@ def test_report_bears_stand_gauges_fingerprints_and_places_to_sign(of_run, folde
 
 def test_run_without_slip_says_so(folder):
     report = made(folder / "c.h5")
-    (verdict,) = part(report, "Result")
+    (_, verdict) = part(report, "Result")
 
     assert (verdict.symbol, verdict.relation, verdict.tone) == (Symbol("f_s"), "≥", "warn")
     assert "did not slip" in verdict.text

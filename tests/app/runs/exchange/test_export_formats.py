@@ -76,6 +76,18 @@ def test_csv(run):
     assert (float(f_d.value), f_d.interval_95_high, f_d.adequate) == (0.1, 0.1008, False)
 
 
+def test_a_simulated_run_is_called_so_in_every_format(run):
+    for name in ("csv", "parquet", "xlsx"):
+        path = exported_file(run, name)
+        read = {"csv": pd.read_csv, "parquet": pd.read_parquet}.get(name)
+        frame = read(path) if read else pd.read_excel(path, sheet_name="Samples")
+        assert (frame["simulated"] == 1).all()
+    assert json.loads(exported_file(run, "json").read_text())["source"] == "simulated"
+    assert loadmat(exported_file(run, "mat"), simplify_cells=True)["run"]["source"] == "simulated"
+    (first, *_) = pyuff.UFF(str(exported_file(run, "uff58"))).read_sets()
+    assert first["id1"].startswith("SIMULATED ")
+
+
 def test_json(run):
     document = json.loads(exported_file(run, "json").read_text())
     found = {name: np.array(c["values"], dtype=float) for name, c in document["samples"].items()}
@@ -122,7 +134,7 @@ def test_xlsx(run):
 def test_latex_shows_value_and_uncertainty_to_the_same_digit(run):
     text = exported_file(run, "latex").read_text()
     assert r"$0.10000 \pm 0.00040$" in text
-    assert r"=run$^\dagger$ & 1FFM1" in text
+    assert r"=run$^\dagger$ \textbf{SIMULATED} & 1FFM1" in text
     assert text.count(r"\\") == 2
 
 
