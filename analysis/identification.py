@@ -76,6 +76,8 @@ class Events:
     release_s: float | None = None
     slip_end_s: float | None = None  # end of the last slip
     rest_s: float | None = None  # the swing is as small as the noise from here on
+    free_decay_end_s: float | None = None
+    """Last time that was fitted, where the free decay ends before the record."""
     release_uncertainty_s: float | None = None
     """Standard uncertainties from the readings; None where they are not known."""
     slip_end_uncertainty_s: float | None = None

@@ -27,7 +27,7 @@ from analysis.fitting.stand_search import (
     stand_problem,
 )
 from analysis.formatting import format_number
-from analysis.identification import Events, Identification, MonteCarlo
+from analysis.identification import Events, Identification, MonteCarlo, residual_share
 from analysis.laws.catalogue import (
     COMPARED_LAWS,
     FALLBACK_LAWS,
@@ -40,6 +40,7 @@ from analysis.laws.law import FrictionLaw, IntegratedSolver
 from analysis.laws.parameters import Parameter
 from analysis.laws.stand_parts import StandEffect, StandModel, StandSolver, compose, extended_point
 from analysis.plate.friction import PlateFriction, estimate_plate_friction
+from analysis.preparation.disturbance import find_departure
 from analysis.preparation.free_decay import TAIL_PERIODS_MIN, FreeDecay, prepare
 from analysis.preparation.oscillation import no_decay_error, pullback_warnings
 from analysis.quantities import ResultWarning, result_warning
@@ -65,6 +66,11 @@ often by 0.4 % with 0.01."""
 _LEFT_MAX = 0.1
 """Share of what no law explains that effects may leave: with more, others must be at work, and what these
 effects explain is theirs."""
+_GROSS_SHARE = 0.02
+"""Of the swing: what friction laws leave of it where a hand may have ended the free decay."""
+_SOUND_SHARE = 0.01  # of the swing: what a law may leave that explains the motion of a real stand
+_BEGINNINGS = (0.5, 0.25, 0.12, 0.06)  # parts of the motion that may be free, the longest first
+_EXTENSIONS = 3  # steps to the end of it, each foreseen by a fit to all before
 Progress = Callable[[float, Message], None]
 
 
@@ -98,6 +104,41 @@ def identify(
             " decay of a table, and gauge 2 the plate on it.",
             fault=str(error),
         ) from error
+
+
+def _free_decay_end(record: Record, decay: FreeDecay) -> float | None:
+    """Time at which a hand ends the free decay: a law foresees the motion until then, and suddenly fails.
+
+    None where there is no such time: what the laws leave is of a stand that was left alone.
+    """
+    release_s, last_s = decay.channels.to_record_time(decay.release.time_s), float(record.time_s[-1])
+    for share in _BEGINNINGS:
+        until_s = release_s + share * (last_s - release_s)
+        for _ in range(_EXTENSIONS):
+            early = _explained(record, until_s)
+            departure = None if early is None else find_departure(record, early, until_s)
+            if departure is None or not departure.is_foreseen_before:
+                break
+            if departure.is_sudden:
+                return departure.time_s
+            until_s = departure.time_s
+    return None
+
+
+def _explained(record: Record, end_s: float) -> Identification | None:
+    """The record until some time as the simplest law explains it; None where it does not."""
+    try:
+        found = _identify(record.replace(decay_end_s=end_s), COMPARED_LAWS[0].name, None, None)
+    except RecordError:
+        return None
+    model = found.model
+    is_sound = model is not None and (model.adequate or (model.residual_share or 1.0) < _SOUND_SHARE)
+    return found if is_sound else None
+
+
+def _share_left(problem: FitProblem, fits: list[Fit]) -> float:
+    """Residual of the likeliest law over the largest swing."""
+    return residual_share(min(fits, key=lambda fit: fit.bic).rms_m, problem.table.value_m)
 
 
 def warm_up() -> None:
@@ -163,6 +204,10 @@ def _identify(
 
     report(0.6, message("fitting {laws}", laws=[law.name for law in laws]))
     fits = search.fit_all(laws, minima)
+    if record.decay_end_s is None and _share_left(problem, fits) > _GROSS_SHARE:
+        end_s = _free_decay_end(record, decay)
+        if end_s is not None:
+            return _identify(record.replace(decay_end_s=end_s), model, progress, monte_carlo)
     fitted = _choose(record, decay, search, minima, fits, start if model == "auto" else None, report)
     report(0.8, message("uncertainty"))
     found = _conclude(record, fitted, plate, monte_carlo, report)

@@ -142,6 +142,8 @@ class Record:
     """True when gauge 2 measures the plate against the base instead of against the table."""
     release: int | None = None
     """Which release is analysed, from 1 in order of time; None: the one with the longest decay."""
+    decay_end_s: float | None = None
+    """Time in the base of `time_s` until which the motion is free; None: as long as the readings show it."""
 
     @classmethod
     def from_arrays(

@@ -36,7 +36,8 @@ from analysis.one_mass.residuals import (
 )
 from analysis.one_mass.turning_points import Crossings, find_crossings
 from analysis.preparation.channels import Channel
-from analysis.preparation.oscillation import check_gap, median_of_three
+from analysis.preparation.disturbance import find_stopped_table
+from analysis.preparation.oscillation import check_gap, median_of_three, white_noise
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import RecordError
 from analysis.uncertainty import numerical_gradient
@@ -78,6 +79,7 @@ class FreeDecayFit:
     holds: bool  # the halves agree, so period and damping hold though the model does not
     unit: str  # of the readings, and of what is left of them
     warnings: list[ResultWarning]
+    stopped_s: float | None = None  # when a hand ended the free decay; None where nothing did
 
 
 def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
@@ -89,6 +91,12 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     warnings: list[ResultWarning] = []
     readings = _without_single_spikes(readings, warnings)
     crossings = find_crossings(readings)
+    free = readings.between(crossings.first_s, math.inf)
+    stopped_s = find_stopped_table(free, crossings.period_s, white_noise(free))
+    if stopped_s is not None:
+        readings = readings.between(-math.inf, stopped_s)
+        crossings = find_crossings(readings)
+        warnings.append(_stopped_warning(stopped_s))
     check_gap(readings, _GAP_PERIODS_MAX * crossings.period_s)
     rounding = _Rounding(rounding_step(readings.value_m), unit)
     found = _refined(_fit_stretch(readings, crossings, order), rounding)
@@ -104,7 +112,16 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
     adequate = verdict.adequate and not doubts
     spread = None if verdict.adequate else spread_of_halves(found.bounded)
     holds = not doubts and spread is not None and halves_agree(found.bounded, spread)
-    return FreeDecayFit(found.bounded, viscous, verdict, adequate, spread, holds, unit, warnings + doubts)
+    warnings += doubts
+    return FreeDecayFit(found.bounded, viscous, verdict, adequate, spread, holds, unit, warnings, stopped_s)
+
+
+def _stopped_warning(stopped_s: float) -> ResultWarning:
+    template = N_(
+        "the swing was stopped {stopped_s} s after the first reading: only readings before are used. Leave"
+        " the table alone until the record has ended."
+    )
+    return result_warning("moved-again", template, stopped_s=format_number(stopped_s))
 
 
 @dataclass(frozen=True, slots=True)

@@ -172,7 +172,7 @@ def _identification(
             residual_share=share,
         ),
         budget.lines + unstated_clock(record, budget.results),
-        _events(channels, solution.fit, significant),
+        _events(channels, solution, significant),
         warnings,
         {
             "turning_s": channels.to_record_time(parameters.turning_s),
@@ -279,9 +279,11 @@ def _classical_figures(
     ]
 
 
-def _events(channels: Channels, found: OneMassFit, significant: bool) -> Events:
-    """When the mass comes to rest, where friction stops it within the record."""
-    parameters = found.parameters
+def _events(channels: Channels, solution: FreeDecayFit, significant: bool) -> Events:
+    """When the mass comes to rest, where friction stops it within the record, or a hand ends the decay."""
+    parameters, stopped_s = solution.fit.parameters, solution.stopped_s
+    if stopped_s is not None:
+        return Events(free_decay_end_s=channels.to_record_time(stopped_s))
     if not significant or parameters.damping_n_per_s < 0.0 or not parameters.is_linear:
         return Events()
     start = parameters.turning_s, parameters.turning

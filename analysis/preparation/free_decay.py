@@ -134,6 +134,7 @@ _MOUNTINGS = {
 
 TAIL_PERIODS_MIN = 2.0  # a shorter tail does not tell damping from a drift of the zero
 _SAME_PERIOD = 0.01  # relative difference: two stretches of one tail have the same period
+_SURELY_BEFORE = 2.0  # sampling intervals that a decay ends before the readings, to be told
 _RELEASE_MARGIN_S = 0.004
 """Uncertainty of the release as `find_releases` gives it: the half window of its slopes, rounded down."""
 _NEVER_SLIPS = 2.0  # residual of a damped cosine over noise above which there must have been slip
@@ -191,6 +192,13 @@ class FreeDecay(_Stretch):
     table_drift_m_per_s: float = 0.0  # the same of gauge 1
 
     @property
+    def early_end_s(self) -> float | None:
+        """Record time at which the free decay ends; None where it lasts as long as the readings."""
+        end_s, steps_s = self.release.end_s, _SURELY_BEFORE * self.channels.interval_s
+        is_early = end_s < float(self.channels.table.time_s[-1]) - steps_s
+        return self.channels.to_record_time(end_s) if is_early else None
+
+    @property
     def dense_until_s(self) -> float:
         """Half a period after the last slip that gauge 2 shows."""
         return np.inf if self.slip_end_s is None else self.slip_end_s + 0.5 * self.period_s
@@ -218,8 +226,14 @@ def prepare(record: Record) -> FreeDecay:
     warnings: list[ResultWarning] = []
     channels = _valid_channels(record, warnings)
     release = _choose_release(oscillation.find_releases(channels.table), record.release, warnings)
+    if record.decay_end_s is not None:
+        end_s = min(channels.from_record_time(record.decay_end_s), release.end_s)
+        release = replace(release, end_s=end_s)
     stretch, period_s = _oriented_stretch(channels, release, record.gauge_2_measures_plate, warnings)
-    stretch = _until_disturbance(stretch, period_s, warnings)
+    undisturbed = _until_disturbance(stretch, period_s)
+    if record.decay_end_s is not None or undisturbed is not stretch:
+        warnings.append(_moved_warning(undisturbed.release))
+    stretch = undisturbed
     if stretch.relative is None:
         slip, drift, table_drift = _slip_by_table_alone(stretch, period_s), 0.0, 0.0
     else:
@@ -362,8 +376,8 @@ def _oriented_stretch(
     return stretch, period_s
 
 
-def _until_disturbance(stretch: _Stretch, period_s: float, warnings: list[ResultWarning]) -> _Stretch:
-    """The stretch up to where a hand moves the plate or stops the table, with a warning if one does."""
+def _until_disturbance(stretch: _Stretch, period_s: float) -> _Stretch:
+    """The stretch up to where a hand moves the plate or stops the table, itself if none does."""
     release_s, table = stretch.release.time_s, stretch.table
     still_s, moved_s = release_s + _SLIPPING_SHARE * (float(table.time_s[-1]) - release_s), None
     if stretch.relative is not None:
@@ -378,14 +392,17 @@ def _until_disturbance(stretch: _Stretch, period_s: float, warnings: list[Result
     end_s = min((end_s for end_s in (moved_s, stopped_s) if end_s is not None), default=None)
     if end_s is None:
         return stretch
+    relative = None if stretch.relative is None else stretch.relative.between(-np.inf, end_s)
+    release = replace(stretch.release, end_s=end_s)
+    return replace(stretch, table=table.between(-np.inf, end_s), relative=relative, release=release)
+
+
+def _moved_warning(release: Release) -> ResultWarning:
     template = N_(
         "the plate or the table was moved {after_s} s after the release: only readings before are used. Leave"
         " the stand alone until the record has ended."
     )
-    warnings.append(result_warning("moved-again", template, after_s=format_number(end_s - release_s)))
-    relative = None if stretch.relative is None else stretch.relative.between(-np.inf, end_s)
-    release = replace(stretch.release, end_s=end_s)
-    return replace(stretch, table=table.between(-np.inf, end_s), relative=relative, release=release)
+    return result_warning("moved-again", template, after_s=format_number(release.end_s - release.time_s))
 
 
 def _slip_by_gauge_2(

@@ -557,6 +557,7 @@ def build_events(joint: JointFit, slip_end: SlipEnd | None) -> Events:
         release_s=to_record(chosen.value(Parameter.RELEASE)),
         slip_end_s=None if slip_end is None else to_record(slip_end.time_s),
         rest_s=None if rest is None else to_record(rest[0]),
+        free_decay_end_s=decay.early_end_s,
         release_uncertainty_s=release_uncertainty_s / scale,
         slip_end_uncertainty_s=None if slip_end is None else slip_end.uncertainty_s / scale,
         rest_uncertainty_s=None if rest is None else rest[1] / scale,

@@ -91,6 +91,8 @@ def _result_rows(results: dict[str, Any], events: dict[str, Any]) -> Iterator[tu
     if events["slip_end_s"] is not None:
         since_s, uncertainty_s = events["slip_end_s"] - events["release_s"], events["slip_end_uncertainty_s"]
         yield "slip ended", f"{format_value(since_s, uncertainty_s)} s after the release"
+    if (end_s := events.get("free_decay_end_s")) is not None:
+        yield "fitted until", f"{end_s:.3f} s of the record, where the free decay ends"
 
 
 def _print_model(document: dict[str, Any], scale: float, unit: str) -> None:

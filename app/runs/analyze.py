@@ -72,6 +72,7 @@ def analyze_run(
         identification = identify(
             record, model=request.model, progress=progress, monte_carlo=request.monte_carlo
         )
+    record = record.replace(decay_end_s=identification.events.free_decay_end_s)
     metadata = run.metadata
     identification.warnings.extend(
         [

@@ -113,10 +113,10 @@ def analysis_document(
 def inputs_hash(record: Record) -> str:
     """Hash of all that an analysis takes: readings, masses, calibration uncertainties, clock.
 
-    Which release of the record is analysed belongs to the request.
+    Which release of the record is analysed belongs to the request, and the end of its free decay is found.
     """
     digest = hashlib.blake2b(digest_size=16)
-    for field in (field for field in fields(record) if field.name != "release"):
+    for field in (field for field in fields(record) if field.name not in ("release", "decay_end_s")):
         value = getattr(record, field.name)
         digest.update(field.name.encode())
         digest.update(value.tobytes() if isinstance(value, np.ndarray) else msgspec.json.encode(value))

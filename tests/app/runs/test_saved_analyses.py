@@ -76,6 +76,7 @@ def test_document_is_that_of_the_interface(run_path):
         "release_s": 2.25,
         "slip_end_s": 4.5,
         "rest_s": None,
+        "free_decay_end_s": None,
         "release_uncertainty_s": None,
         "slip_end_uncertainty_s": 0.002,
         "rest_uncertainty_s": None,
