@@ -102,13 +102,7 @@ def save_calibration(
     load_gauges(base)
     document = tomlkit.parse(base.read_text(encoding="utf-8"))
     for name, gauge in gauges.items():
-        section: Any = document[name]
-        for field in msgspec.structs.fields(Gauge):
-            value = getattr(gauge, field.name)
-            if value is None or (value == field.default and field.name not in section):
-                section.pop(field.name, None)  # a default needs no line
-            else:
-                section[field.name] = _toml_value(value)
+        _write_gauge(document[name], gauge)
     text = tomlkit.dumps(document)
     if path is None:
         return _write_dated(f"gauges-{day.isoformat()}", text)
@@ -145,6 +139,23 @@ def _merge(table: Any, values: dict[str, Any]) -> None:
             table[key] = made
         elif table.get(key) != value:
             table[key] = value
+
+
+def _write_gauge(section: Any, gauge: Gauge) -> None:
+    """Give a section the values of a gauge. A comment beside a value goes with it, others stay."""
+    below = []  # comments at the end of a section are about the next one
+    while section.value.body and section.value.body[-1][0] is None:
+        below.append(section.value.body.pop())
+    before = section.unwrap()
+    for field in msgspec.structs.fields(Gauge):
+        name, value = field.name, getattr(gauge, field.name)
+        if value is None or (value == field.default and (name not in before or value == "")):
+            section.pop(name, None)  # a default needs no line
+        elif name not in before or before[name] != value:
+            section[name] = _toml_value(value)
+            trivia = section.value.item(name).trivia
+            trivia.comment_ws = trivia.comment = ""
+    section.value.body.extend(reversed(below))
 
 
 def _toml_value(value: Any) -> Any:

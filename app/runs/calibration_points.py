@@ -16,6 +16,7 @@ from messages.i18n import N_
 
 _COLUMNS = ("counts", "dial_mm")
 _WAYS = {"up": 1, "down": -1, "+1": 1, "1": 1, "-1": -1, "+": 1, "-": -1}
+_SIMULATED = "SIM-"  # begins the serial numbers of the gauges in the shipped calibration
 _RANGE_OF_FILE = f"The columns are {', '.join(_COLUMNS)}, and perhaps direction (up, down) and round"
 
 
@@ -33,7 +34,7 @@ class CalibrationDetails:
     certificate: str = ""
     calibrated_by: str = ""
     serial_number: str | None = None
-    """None keeps that of the gauge as it was."""
+    """None keeps that of the gauge as it was, unless it is one of the simulated stand."""
     range_m: float | None = None
     filter: Filter | None = None
     """None keeps that of the gauge as it was."""
@@ -42,6 +43,8 @@ class CalibrationDetails:
 def calibrated_gauge(before: Gauge, found: Calibration, about: CalibrationDetails) -> Gauge:
     """The gauge with its new calibration; delay and what it measures stay as they were."""
     kept = {name for name in ("serial_number", "range_m", "filter") if getattr(about, name) is None}
+    if before.serial_number.startswith(_SIMULATED):
+        before = before.replace(serial_number="")
     return before.replace(
         gain_m_per_count=found.gain_m_per_count.value,
         zero_count=found.zero_count.value,

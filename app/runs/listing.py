@@ -69,7 +69,10 @@ def _is_text(path: str) -> bool:
 
 
 class RunFilter(msgspec.Struct, frozen=True):
-    """Which runs of a library to show. Of a file with a fault, its name and date of change decide."""
+    """Which runs of a library to show. Of a file with a fault, its name and date of change decide.
+
+    A run whose start is not known, as of an imported record, is of no day.
+    """
 
     series: str | None = None
     since: datetime.date | None = None
@@ -82,8 +85,8 @@ class RunFilter(msgspec.Struct, frozen=True):
     def matches(self, run: RunSummary) -> bool:
         return (
             (self.series is None or self.series.strip().upper() in _series(run))
-            and (self.since is None or _day(run) >= self.since)
-            and (self.until is None or _day(run) <= self.until)
+            and (self.since is None or ((day := _day(run)) is not None and day >= self.since))
+            and (self.until is None or ((day := _day(run)) is not None and day <= self.until))
             and (self.operator is None or self.operator.casefold() == run.operator.casefold())
             and (self.text is None or _holds(run, self.text.casefold()))
             and (self.stale is None or self.stale == run.stale)
@@ -226,9 +229,12 @@ def _holds(run: RunSummary, text: str) -> bool:
     return text == run.source or text in "\n".join(parts).casefold()
 
 
-def _day(run: RunSummary) -> datetime.date:
+def _day(run: RunSummary) -> datetime.date | None:
+    """Day of a run; of a file with a fault that of its last change. None where the start is not known."""
     if run.start_time is not None:
         return run.start_time.astimezone().date()
+    if not run.fault:
+        return None
     try:
         return datetime.datetime.fromtimestamp(Path(run.path).stat().st_mtime).astimezone().date()
     except OSError:

@@ -164,6 +164,19 @@ def test_a_new_calibration_keeps_comments_device_and_the_other_gauge(own_folder:
     assert "nonlinearity_m" not in path.read_text().partition("[relative]")[0]
 
 
+def test_comments_stay_at_what_they_are_about(own_folder: Path) -> None:
+    base = settings_file("gauges.toml")
+    table = load_gauges(base).table.replace(serial_number="W7", calibrated_by="A. Operator")
+    text = save_calibration({"table": table}, base, DAY).read_text()
+
+    of_table, _, of_relative = text.partition("# Gauge 2: upper plate against the box.\n")
+    assert of_relative.startswith("[relative]\n")
+    assert of_table.endswith('calibrated_by = "A. Operator"\n\n')
+    assert 'serial_number = "W7"\n' in of_table
+    assert "simulated" not in of_table
+    assert 'serial_number = "SIM-2"  # of the simulated stand' in of_relative
+
+
 def test_calibrations_of_a_day_stand_beside_each_other(own_folder: Path) -> None:
     base = settings_file("gauges.toml")
     table = load_gauges(base).table

@@ -91,6 +91,19 @@ def test_both_gauges_one_after_the_other_end_up_in_use(
     assert len(list(config_folder.glob("*.toml"))) == 4
 
 
+def test_a_gauge_keeps_its_serial_number_but_not_that_of_the_simulated_stand(
+    slipstand: Any, points: Path
+) -> None:
+    calibrate = ("calibrate", "--gauge", "table", "--points", points, "--use")
+    assert load_gauges().table.serial_number == "SIM-1"
+    slipstand(*calibrate)
+    assert load_gauges().table.serial_number == ""
+    assert load_gauges().relative.serial_number == "SIM-2"
+    slipstand(*calibrate, "--serial-number", "W7")
+    slipstand(*calibrate)
+    assert load_gauges().table.serial_number == "W7"
+
+
 def test_a_stated_filter_is_kept_until_another_is_stated(slipstand: Any, points: Path) -> None:
     calibrate = ("calibrate", "--gauge", "relative", "--points", points, "--use")
     stated = slipstand(*calibrate, "--filter", "bessel", "--filter-order", 4, "--filter-corner", 50, "--json")

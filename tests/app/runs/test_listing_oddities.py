@@ -15,7 +15,9 @@ from runs_kit import ANALYSIS, small_run
 
 from app.runs import listing as library_module
 from app.runs.listing import RunFilter, index_path, list_runs
+from app.runs.metadata import IMPORT_PROTOCOL
 from app.runs.saved_analyses import save_analysis
+from drivers.samples import DeviceIdentity
 from messages.message import Message
 
 SINCE = RunFilter(since=datetime.date(2020, 1, 1))
@@ -105,3 +107,12 @@ def test_an_entry_of_the_index_that_cannot_be_read_begins_it_anew(good):
     index_path(good.parent).write_bytes(damaged)
     assert list_runs(good.parent) == listed
     assert list(msgspec.msgpack.decode(index_path(good.parent).read_bytes())[1]) == [str(good)]
+
+
+def test_a_run_whose_start_is_not_known_is_of_no_day(tmp_path, metadata):
+    """Its file was written today, which says nothing of the test."""
+    of_import = DeviceIdentity(IMPORT_PROTOCOL, "import")
+    small_run(tmp_path / "imported.h5", metadata.replace(start_time=None, device=of_import))
+    assert _names(tmp_path, RunFilter()) == ["imported.h5"]
+    assert _names(tmp_path, SINCE) == []
+    assert _names(tmp_path, RunFilter(until=datetime.date(2099, 1, 1))) == []
