@@ -211,6 +211,7 @@ class Record:
         }
         return self.replace(**columns)
 
+
 def _float_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
     try:
         array = np.ascontiguousarray(values, dtype=np.float64)

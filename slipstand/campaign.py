@@ -14,6 +14,7 @@ from app.reports.table.text import TableContent, row_cells, table_headers
 from app.runs.analysis_json import json_values
 from app.runs.batch.executors import ExecutorOptions
 from app.runs.campaign.collect import CollectOptions, collect_runs
+from app.runs.campaign.origin import campaign_command
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -73,6 +74,6 @@ def pool(paths: str | PathLike[str] | Iterable[str | PathLike[str]], *, jobs: in
     The newest result that is kept in a run is taken if it still stands, else the run is identified, by `jobs`
     processes (None: one for each core). Raises RunError.
     """
-    given = [paths] if isinstance(paths, (str, PathLike)) else list(paths)
-    options = CollectOptions(executor=ExecutorOptions(jobs=jobs))
-    return PooledSeries(TableContent.of_runs(collect_runs([Path(path) for path in given], options)))
+    given = [Path(path) for path in ([paths] if isinstance(paths, (str, PathLike)) else paths)]
+    runs = collect_runs(given, CollectOptions(executor=ExecutorOptions(jobs=jobs)))
+    return PooledSeries(TableContent.of_runs(runs, campaign_command("table", given)))

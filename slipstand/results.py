@@ -16,7 +16,8 @@ from analysis.quantities import BudgetLine, Quantity, ResultWarning
 from analysis.record import Record
 from analysis.verdict_text import describe_verdict
 from app.runs.analysis_json import unstated_warnings
-from app.runs.analyze import AnalysisRequest, analyze_run
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.analyze import analyze_run
 from app.runs.saved_analyses import analysis_document
 from drivers.samples import Losses
 from slipstand.runs import Run

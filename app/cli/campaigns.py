@@ -22,11 +22,6 @@ def load_campaign(
         return collect_runs(paths, options, update)
 
 
-def absolute_paths(paths: Sequence[Path]) -> list[str]:
-    """Paths as the command that repeats a table names them, from any folder."""
-    return [str(path.expanduser().absolute()) for path in paths]
-
-
 def exit_with_failures(runs: CollectedRuns) -> None:
     """Print on stderr which runs gave no result and why, and end with exit code 1 where there are any."""
     for failure in runs.failures:

@@ -3,13 +3,13 @@
 import datetime
 
 from app.cli import output as out
-from app.cli.campaigns import absolute_paths, exit_with_failures, load_campaign
+from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
 from app.cli.result_options import ReportOptions
 from app.reports.table.text import TableContent
 from app.reports.test_report.build import TITLE, ReportHead, build_report
 from app.reports.test_report.render import write_report
-from app.runs.analysis_request import quote_command
+from app.runs.campaign.origin import campaign_command
 
 
 def report(options: ReportOptions) -> None:
@@ -38,8 +38,7 @@ def _reproduce(options: ReportOptions, head: ReportHead) -> str:
     words += ["--title", options.title] if options.title else []
     words += ["--laboratory", options.laboratory] if options.laboratory else []
     words += [word for run in options.exclude or () for word in ("--exclude", run)]
-    paths = absolute_paths(options.paths)
-    return quote_command(["slipstand", "report", *paths, "-o", "REPORT.pdf", *words])
+    return campaign_command("report", options.paths, ["-o", "REPORT.pdf", *words])
 
 
 def _head(date: str, title: str, laboratory: str) -> ReportHead:

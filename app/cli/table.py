@@ -11,12 +11,12 @@ from analysis.audit import PublishedRow, audit
 from analysis.campaign.campaign import Campaign, compare_with_published
 from analysis.catalogue import optional_columns
 from app.cli import output as out
-from app.cli.campaigns import absolute_paths, exit_with_failures, load_campaign
+from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
 from app.cli.result_options import TableOptions
 from app.reports.table.files import as_text, write_table
 from app.reports.table.text import PublishedRowComparison, TableContent, note_sections
-from app.runs.analysis_request import quote_command
+from app.runs.campaign.origin import campaign_command
 from config.files import load_stand, published_table
 
 _WIDTH_MIN, _UNLIMITED = 40, 1_000_000  # columns of a narrow terminal, and of a pipe
@@ -48,7 +48,7 @@ def _reproduce(options: TableOptions) -> str:
     chosen = {"--column": options.column, "--exclude": options.exclude}
     words = [word for name, values in chosen.items() for value in values or () for word in (name, value)]
     words += ["--published"] if options.published else []
-    return quote_command(["slipstand", "table", *absolute_paths(options.paths), *words])
+    return campaign_command("table", options.paths, words)
 
 
 def _format(name: str, output: Path | None, *, as_json: bool) -> str:

@@ -20,9 +20,10 @@ from app.reports.table.text import TableContent
 from app.reports.test_report.build import ReportHead, build_report
 from app.reports.test_report.render import write_report
 from app.runs.analysis_json import read_quantity
-from app.runs.analyze import AnalysisRequest
+from app.runs.analysis_request import AnalysisRequest
 from app.runs.batch.tasks import AnalysisTask, analyze_one
 from app.runs.campaign.collect import CollectedRuns, collect_runs
+from app.runs.campaign.origin import campaign_command
 from app.runs.errors import NotARunError, RunError
 from app.runs.exchange.arrivals import READABLE, Arrivals
 from app.runs.exchange.import_run import free_path, import_foreign_file
@@ -97,14 +98,16 @@ class FolderWatch:
         if not (self.table or self.report) or not self.analysed:
             return
         runs = collect_runs(self.analysed)
-        content = TableContent.of_runs(runs)
         if self.table:
+            content = TableContent.of_runs(runs, campaign_command("table", self.analysed))
             write_table(content, self.table, _TABLE_FORMATS[self.table.suffix.lower()], replace=True)
         if self.report and runs.runs:
-            self._write_report(self.report, runs, content)
+            self._write_report(self.report, runs)
 
-    def _write_report(self, path: Path, runs: CollectedRuns, content: TableContent) -> None:
+    def _write_report(self, path: Path, runs: CollectedRuns) -> None:
         today = datetime.datetime.now().astimezone().date()
+        words = ["-o", path.name, "--date", today.isoformat()]
+        content = TableContent.of_runs(runs, campaign_command("report", self.analysed, words))
         write_report(build_report(runs, content, ReportHead(today)), path, replace=True)
 
 

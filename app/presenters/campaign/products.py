@@ -11,8 +11,8 @@ from app.reports.table.files import write_table
 from app.reports.table.text import TableContent
 from app.reports.test_report.build import TITLE, ReportHead, build_report
 from app.reports.test_report.render import write_report
-from app.runs.analysis_request import quote_command
 from app.runs.campaign.collect import CollectedRuns
+from app.runs.campaign.origin import campaign_command
 from messages.i18n import gettext, translate
 from messages.message import Message
 
@@ -32,7 +32,7 @@ def write_product(
     if product is Product.FIGURES:
         return _write_figures(target, runs, report)
     command = "table" if product is Product.TABLE else "report"
-    content = TableContent.of_runs(runs, quote_command(["slipstand", command, folder]))
+    content = TableContent.of_runs(runs, _reproduce(command, scope, runs))
     if product is Product.TABLE:
         name = _TABLE_FORMATS.get(target.suffix.lower(), "text")
         write_table(content, target, name, with_repeats=True, replace=True)
@@ -40,6 +40,13 @@ def write_product(
         head = ReportHead(datetime.datetime.now().astimezone().date(), TITLE, "")
         write_report(build_report(runs, content, head), target, replace=True)
     return (str(target),)
+
+
+def _reproduce(command: str, scope: CampaignScope, runs: CollectedRuns) -> str:
+    """Command line that gives the same: it counts simulated runs unless they are excluded."""
+    left_out = () if runs.counts_simulated else runs.simulated
+    words = [word for path in left_out for word in ("--exclude", f"{path}=simulated")]
+    return campaign_command(command, [Path(scope.folder)], words)
 
 
 def _write_figures(target: Path, runs: CollectedRuns, report: ReportProgress) -> tuple[str, ...]:

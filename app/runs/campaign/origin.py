@@ -3,8 +3,10 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
+from app.runs.analysis_request import quote_command
 from app.runs.campaign.run_result import RunDetails
 from app.runs.hashes import content_hash
 from app.runs.metadata import RunSource
@@ -109,6 +111,12 @@ class CampaignOrigin:
 
     def _some(self, names: Iterable[str]) -> list[RunDetails]:
         return [self.runs[name] for name in names if name in self.runs]
+
+
+def campaign_command(name: str, paths: Iterable[Path], words: Iterable[str] = ()) -> str:
+    """Command `slipstand NAME` of runs and folders, from any folder."""
+    absolute = (str(path.expanduser().absolute()) for path in paths)
+    return quote_command(["slipstand", name, *absolute, *words])
 
 
 def _inputs(origins: Iterable[Mapping[str, Any]]) -> str:
