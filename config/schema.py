@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, get_args
 
 import msgspec
 
-from messages.i18n import N_
+from messages.i18n import N_, languages
 from messages.message import Message, MessageError, message
 
 if TYPE_CHECKING:
@@ -319,7 +319,8 @@ class Settings(_Checked, frozen=True):
     """What a person has chosen for the window, and where runs go."""
 
     theme: Literal["system", "light", "dark"] = "system"  # of the window
-    language: Literal["system", "en", "ru"] = "system"  # of the window, from the next start on
+    language: str = "system"
+    """Of the window, from the next start on: `system`, `en`, or that of a catalogue of `messages/locale`."""
     scale: float = 1.0
     """Of all that is shown, on top of the system's own scaling."""
     recordings: str = ""  # folder of the runs; empty for the usual one
@@ -331,6 +332,9 @@ class Settings(_Checked, frozen=True):
     displacement_unit: Literal["mm", "um"] = "mm"  # of displacements on screens
 
     def __post_init__(self) -> None:
+        if self.language not in ("system", *languages()):
+            known = ", ".join(("system", *languages()))
+            raise ValueError(f"language = {self.language!r} must be one of {known}")
         if not SCALE_MIN <= self.scale <= SCALE_MAX:
             raise ValueError(f"scale = {self.scale!r} must be from {SCALE_MIN:g} to {SCALE_MAX:g}")
 

@@ -35,6 +35,14 @@ def languages() -> tuple[str, ...]:
     return (ENGLISH, *sorted(path.parts[-3] for path in LOCALE.glob(f"*/LC_MESSAGES/{DOMAIN}.mo")))
 
 
+def language_names() -> dict[str, str]:
+    """Names of all languages, each in itself, by code: its translation of "English"."""
+    return {
+        code: gettext_module.translation(DOMAIN, LOCALE, [code], fallback=True).gettext(_OWN_NAME)
+        for code in languages()
+    }
+
+
 def gettext(text: str, /, **values: object) -> str:
     """Translate a text, then replace its `{fields}`; without values braces stay as they are."""
     translated = _translations.gettext(text) if text else ""
@@ -49,6 +57,9 @@ def ngettext(one: str, many: str, count: int, /, **values: object) -> str:
 def N_(text: str) -> str:  # noqa: N802 - the name that gettext recommends
     """Mark a text for translation that is translated where it is shown, as in a table of names."""
     return text
+
+
+_OWN_NAME = N_("English")
 
 
 def translate(message: Message | str) -> str:

@@ -9,12 +9,12 @@ from analysis.catalogue import DISPLACEMENT_UNITS
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
 from config.schema import ConfigError, Settings, Stand
-from messages.i18n import N_, gettext
+from messages.i18n import N_, gettext, language_names
 from messages.message import message_of
 
 CHOICES: dict[str, dict[Any, str]] = {
     "theme": {"system": N_("As the system"), "light": N_("Light"), "dark": N_("Dark")},
-    "language": {"system": N_("As the system"), "en": "English", "ru": "Русский"},
+    "language": {"system": N_("As the system"), **language_names()},
     "scale": {scale: f"{scale:.0%}" for scale in (1.0, 1.25, 1.5, 1.75, 2.0)},
     "displacement_unit": {name: unit.symbol for name, unit in DISPLACEMENT_UNITS.items()},
     "log_level": {

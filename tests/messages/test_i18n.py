@@ -11,7 +11,7 @@ from babel.messages.mofile import write_mo
 from babel.messages.pofile import read_po
 
 from messages import i18n
-from messages.i18n import N_, gettext, languages, ngettext, translate
+from messages.i18n import N_, gettext, language_names, languages, ngettext, translate
 from messages.message import Message, message
 
 RUSSIAN = r"""# A comment
@@ -63,7 +63,8 @@ def test_english_is_what_is_written() -> None:
         "2 runs",
     ]
     assert N_("Slip") == "Slip"
-    assert languages() == ("en", "ru")
+    assert languages() == ("en", "ru", "uz")
+    assert language_names() == {"en": "English", "ru": "Русский", "uz": "O‘zbekcha"}
     assert translate(message("{port} is busy", port="COM3")) == "COM3 is busy"
 
 
