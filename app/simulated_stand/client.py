@@ -50,7 +50,10 @@ decode_stand_event: Callable[[bytes], StandEvent] = json_decoder(StandEvent)
 
 
 class SimulatedStand:
-    """A simulated stand in its own process, which ends with this one; a context manager, made by `start`."""
+    """A simulated stand in its own process; a context manager, made by `start`.
+
+    It ends with this process, or when an engine has finished the run that it records then.
+    """
 
     _READY_S = 600.0  # a first start compiles the solver, each file of it watched by a virus scanner
 
@@ -111,6 +114,7 @@ class SimulatedStand:
 
     def stop(self) -> None:
         """End the process; may be called twice. `truth` is complete from then on."""
+        self.ask(Gesture.END)
         self._child.stop(self._STOP_S)
 
     def __enter__(self) -> Self:

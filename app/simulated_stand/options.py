@@ -21,6 +21,7 @@ class Gesture(StrEnum):
 
     PULL = "pull"  # begin a test, where they begin on demand and the last one was released
     EARLY = "early"  # let the next test go too early
+    END = "end"  # take the device away
 
 
 class SimulatedStandError(DriverError):

@@ -37,8 +37,11 @@ def serve(
     has_ended: Callable[[], bool],
     on_truth: Callable[[Truth], None] | None = None,
     next_disturbance: Callable[[], Disturbance | Gesture | None] = lambda: None,
+    is_orphaned: Callable[[], bool] = lambda: False,
 ) -> None:
     """Run a simulated stand in this process until `has_ended()`.
+
+    Where `is_orphaned()`, it goes on only while somebody reads it: an engine that finishes a run.
 
     Raises ConfigError, DriverError, AnalysisError if it cannot be set up as asked; `on_ready` was not called
     then. `on_ready` receives what a reader must know, `on_truth` the truth at the start, at each change and
@@ -62,7 +65,7 @@ def serve(
         files = done.truth_file, done.gauges_file
         on_ready(Ready(transport.url, done.protocol, done.sample_rate_hz, done.series, *files))
         publish(stand.truth())
-        while not has_ended():
+        while not (has_ended() or stand.is_over) and (stand.has_reader or not is_orphaned()):
             while (disturbance := next_disturbance()) is not None:
                 stand.disturb(disturbance, time.perf_counter_ns())
             transport.wait(stand.step(time.perf_counter_ns()))
@@ -84,9 +87,10 @@ def main() -> int:
         serve(
             options,
             lambda ready: events.send(Started(ready)),
-            lambda: has_ended.is_set() or disturbances.is_closed,
+            has_ended.is_set,
             lambda truth: events.send(TruthChanged(truth)),
             disturbances.take,
+            lambda: disturbances.is_closed,
         )
     except (ConfigError, DriverError, AnalysisError) as error:
         events.send(Refused(str(error)))

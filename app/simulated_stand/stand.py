@@ -31,6 +31,7 @@ class SimulatedStandDevice:
         self, options: SimulatedStandOptions, transport: Transport, on_truth: Callable[[Truth], None]
     ) -> None:
         self._options = options = options.completed()
+        self.is_over = False
         self._on_truth = on_truth
         self._transport = transport
         self._true = stand_truth(options, load_stand(options.stand_file))
@@ -79,10 +80,16 @@ class SimulatedStandDevice:
             disturbances=list(self._device.disturbances),
         )
 
+    @property
+    def has_reader(self) -> bool:
+        return self._device.has_reader
+
     def disturb(self, disturbance: Disturbance | Gesture, now_ns: int) -> None:
         match disturbance:
             case Gesture.PULL:
                 self._motion.request(self._device.time_s(now_ns))
+            case Gesture.END:
+                self.is_over = True
             case Gesture.EARLY:
                 self._motion.let_go_early(self._options.early_release_m)
             case Disturbance():

@@ -92,6 +92,10 @@ class SimulatedDevice:
         self.streams = 0  # streams started until now
 
     @property
+    def has_reader(self) -> bool:
+        return self._has_reader
+
+    @property
     def is_streaming(self) -> bool:
         return self._stream is not None
 

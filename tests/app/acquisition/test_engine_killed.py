@@ -14,6 +14,7 @@ from engine_kit import FILES, connect, port_of, run_in, stand, until
 from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import Arm, EndReason, Failed, PullbackState, RunEnded, RunStarted, StateChanged
 from app.runs.reader import load_counts, open_run
+from app.runs.unattended import read_notes
 from app.runs.validator import Validator
 from tests.drills.processes import children_of, descendants_of, gone
 
@@ -77,7 +78,7 @@ from app.acquisition.messages import Arm, Connected, PortSettings, RunSettings, 
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.runs.validator import Validator
-stand_file, gauges_file, folder = sys.argv[1:]
+stand_file, gauges_file, folder, until = sys.argv[1:]
 stand = SimulatedStand.start(SimulatedStandOptions(rate_hz=1000.0))
 validator = Validator.start()
 port = PortSettings(url=stand.port, protocol="slipstand-binary")
@@ -85,27 +86,32 @@ engine = EngineClient.start(port, stand_file, gauges_file)
 while True:
     event = engine.wait(1.0)
     if isinstance(event, Connected):
-        engine.send(Arm(RunSettings(directory=folder, series="1FFM0")))
-    if isinstance(event, StateChanged) and event.state == "zero":
-        print("armed", flush=True)
+        engine.send(Arm(RunSettings(directory=folder, series="1FFM0", duration_s=2.0)))
+    if isinstance(event, StateChanged) and event.state == until:
+        print(until, flush=True)
 """
 
 
-def test_nothing_runs_on_when_the_window_was_killed(tmp_path):
-    """Stand, engine, writer, live identification and validator notice it by the end of their pipes."""
+@pytest.mark.parametrize(("until", "ended"), [("zero", ""), ("slipping", "duration")])
+def test_a_killed_window_leaves_no_process_but_what_finishes_a_run(tmp_path, until, ended):
+    """Stand, engine, writer, live identification and validator notice it by the end of their pipes.
+
+    The stand goes on while the engine reads it. Of a run before its pull nothing is kept.
+    """
     owner = subprocess.Popen(
-        [sys.executable, "-c", OWNER, *FILES, str(tmp_path)], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", OWNER, *FILES, str(tmp_path), until], stdout=subprocess.PIPE, text=True
     )
     with owner:
-        assert owner.stdout.readline() == "armed\n"
+        assert owner.stdout.readline().strip() == until
         running = descendants_of(owner.pid)
         said = b" ".join(command_of(pid) for pid in running)
         for module in (b"simulated_stand", b"acquisition.engine", b"runs.writer", b"runs.validator"):
             assert module in said
         owner.kill()
     assert all(gone(process_id, patience_s=30.0) for process_id in running)
-    (path,) = tmp_path.iterdir()
-    assert open_run(path).end.ended == "interrupted"
+    assert [open_run(path).end.ended for path in tmp_path.iterdir()] == [ended] * bool(ended)
+    (note,) = read_notes(tmp_path).values()
+    assert (note.ended, bool(note.path)) == (ended or "interrupted", bool(ended))
 
 
 def test_an_examiner_ends_with_who_asked_it():
