@@ -7,10 +7,11 @@ from PySide6.QtWidgets import QGridLayout, QLabel, QProgressBar, QPushButton, QV
 
 from app.presenters.base import Chip, Tone
 from app.presenters.identify.state import BudgetRow, ClassicalRow, IdentifyState, ModelRow
-from app.presenters.results import Result
+from app.presenters.results import Result, ResultRow
 from app.qt.theme import TextRole
 from app.qt.widgets.layouts import make_column
-from app.qt.widgets.text import ValueLabel, break_path, label, show_chip
+from app.qt.widgets.selectable_rows import GridRow, SelectableRows
+from app.qt.widgets.text import ValueLabel, break_path, label, plain_text, show_chip, symbol_text
 from messages.i18n import gettext
 
 
@@ -27,33 +28,39 @@ class ResultsPanel(QWidget):
             return
         _add_headline(layout, state, result)
         if state.models:
-            titles = ("", "f<sub>d</sub>", gettext("residual / noise"), "")
-            rows = [cells for row in state.models for cells in self._model_cells(row)]
-            models = _grid([_heads(titles), *rows], (0, 3), right=(1, 2, 3))
-            _add_section(layout, gettext("Friction laws"), models)
-        quantities = [
-            (
-                label(row.symbol),
-                label(row.name, muted=True, wrap=True),
-                label(row.value),
-                label(row.uncertainty_text),
-            )
-            for row in state.rows
-        ]
-        _add_section(layout, gettext("Results"), _grid(quantities, (1,), right=(2,)))
+            _add_section(layout, gettext("Friction laws"), self._models(state.models))
+        _add_section(layout, gettext("Results"), _results(state.rows))
         layout.addLayout(self._classical)
         self.show_classical(state.classical)
         if state.budget:
             title = gettext("Uncertainty of {quantity}", quantity=result.headline.symbol)
-            _add_section(layout, title, _grid(map(_budget_cells, state.budget), (0, 1), right=(2,)))
+            _add_section(layout, title, _budget(title, state.budget))
         layout.addStretch(1)
         layout.addWidget(label(break_path(result.path), TextRole.LABEL, muted=True, wrap=True))
 
     def show_classical(self, rows: tuple[ClassicalRow, ...]) -> None:
         if rows and not self._classical.count():
-            heads = _heads(("", "", gettext("classical"), gettext("fitted")))
-            grid = _grid([heads, *map(_classical_cells, rows)], (1, 2), right=(2, 3))
-            _add_section(self._classical, gettext("Classical figures"), grid)
+            _add_section(self._classical, gettext("Classical figures"), _classical(rows))
+
+    def _models(self, models: tuple[ModelRow, ...]) -> QWidget:
+        titles = ("", "f<sub>d</sub>", gettext("residual / noise"), "")
+        lines: list[Sequence[QWidget]] = [_heads(titles)]
+        rows = []
+        for model in models:
+            cells = list(self._model_cells(model))
+            copied = (model.law, model.effects, model.friction, model.ratio, model.status.text)
+            rows.append(GridRow(len(lines), len(lines) + len(cells) - 1, copied))
+            lines += cells
+        copied_titles = (
+            gettext("law"),
+            gettext("effects"),
+            "f_d",
+            gettext("residual / noise"),
+            gettext("verdict"),
+        )
+        return SelectableRows(
+            gettext("Friction laws"), _grid(lines, (0, 3), right=(1, 2, 3)), copied_titles, rows
+        )
 
     def _model_cells(self, row: ModelRow) -> Iterator[Sequence[QWidget]]:
         button = QPushButton(row.law)
@@ -93,10 +100,51 @@ def _add_headline(layout: QVBoxLayout, state: IdentifyState, result: Result) -> 
         layout.addWidget(_chip(Chip(text, Tone.WARN), TextRole.TEXT))
 
 
-def _add_section(layout: QVBoxLayout, title: str, grid: QGridLayout) -> None:
+def _add_section(layout: QVBoxLayout, title: str, rows: QWidget) -> None:
     layout.addSpacing(8)
     layout.addWidget(label(title, TextRole.HEADING))
-    layout.addLayout(grid)
+    layout.addWidget(rows)
+
+
+def _results(results: tuple[ResultRow, ...]) -> QWidget:
+    cells = [
+        (
+            label(row.symbol),
+            label(row.name, muted=True, wrap=True),
+            label(row.value),
+            label(row.uncertainty_text),
+        )
+        for row in results
+    ]
+    titles = (gettext("symbol"), gettext("quantity"), gettext("value"), "u", gettext("unit"))
+    copied = [(symbol_text(row.symbol), row.name, row.value, row.uncertainty, row.unit) for row in results]
+    return _rows(gettext("Results"), _grid(cells, (1,), right=(2,)), titles, copied)
+
+
+def _classical(rows: tuple[ClassicalRow, ...]) -> QWidget:
+    heads = _heads(("", "", gettext("classical"), gettext("fitted")))
+    grid = _grid([heads, *map(_classical_cells, rows)], (1, 2), right=(2, 3))
+    titles = (gettext("symbol"), gettext("quantity"), gettext("classical"), gettext("fitted"))
+    copied = [(symbol_text(row.symbol), plain_text(row.name), row.classical, row.fitted) for row in rows]
+    return _rows(gettext("Classical figures"), grid, titles, copied, first_line=1)
+
+
+def _budget(title: str, rows: tuple[BudgetRow, ...]) -> QWidget:
+    grid = _grid(map(_budget_cells, rows), (0, 1), right=(2,))
+    titles, copied = (gettext("source"), "u"), [(row.source, row.value) for row in rows]
+    return _rows(plain_text(title), grid, titles, copied)
+
+
+def _rows(
+    name: str,
+    grid: QGridLayout,
+    titles: Sequence[str],
+    copied: Sequence[tuple[str, ...]],
+    first_line: int = 0,
+) -> SelectableRows:
+    """Rows of one line each."""
+    rows = [GridRow(line, line, cells) for line, cells in enumerate(copied, start=first_line)]
+    return SelectableRows(name, grid, titles, rows)
 
 
 def _grid(

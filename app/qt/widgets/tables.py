@@ -1,6 +1,6 @@
 """Conventions of tables: rows copied for a spreadsheet, columns chosen from a menu and moved by dragging."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 
 from PySide6.QtCore import QPoint, Qt
@@ -56,6 +56,11 @@ def rows_text(table: QTableView) -> str:
     for row in rows:
         indexes = [model.index(row, section) for section in shown]
         lines.append([cell for index in indexes for cell in index.data(COPIED_ROLE) or (index.data(),)])
+    return tabbed_text(lines)
+
+
+def tabbed_text(lines: Iterable[Iterable[object]]) -> str:
+    """Join cells by tabs and lines by line ends; signs of numbers are those that a spreadsheet knows."""
     return "".join("\t".join(map(_plain, line)) + "\n" for line in lines)
 
 

@@ -76,6 +76,11 @@ def plain_text(rich: str) -> str:
     return QTextDocumentFragment.fromHtml(rich).toPlainText()
 
 
+def symbol_text(rich: str) -> str:
+    """A symbol without markup: `f_d` for an f with the subscript d."""
+    return plain_text(re.sub(r"<sub>(.*?)</sub>", r"_\1", rich))
+
+
 def break_path(path: str) -> str:
     """Let a long path wrap at its separators."""
     return path.replace("/", "/\u200b").replace("\\", "\\\u200b")

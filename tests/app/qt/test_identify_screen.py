@@ -9,6 +9,7 @@ import pytest
 from looking import clipped_words, visible_words
 from pointing import Hand
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker, analysed
@@ -28,6 +29,7 @@ from app.presenters.identify.state import ClassicalRow, Cursor, ManualFit, PlotL
 from app.qt.identify.screen import IdentifyScreen
 from app.qt.theme import Theme
 from app.qt.widgets.plots import Plot, PlotStack
+from app.qt.widgets.selectable_rows import SelectableRows
 from app.qt.widgets.shortcuts import list_shortcuts
 from messages.message import message
 
@@ -646,3 +648,70 @@ def test_curves_are_saved_by_the_name_of_the_run_with_names_and_units(stage: Sta
         "relative displacement, residual, µm",
     ]
     assert {curve.x_title for curve in stack.curves_in_view()} == {"time from release, s"}
+
+
+def rows_of(stage: Stage, name: str) -> SelectableRows:
+    for _ in range(3):  # the column first learns its height
+        QApplication.processEvents()
+    (found,) = [rows for rows in stage.screen.findChildren(SelectableRows) if rows.accessibleName() == name]
+    return found
+
+
+def copied_lines() -> list[list[str]]:
+    return [line.split("\t") for line in QGuiApplication.clipboard().text().splitlines()]
+
+
+def test_results_are_selected_by_mouse_and_keys_and_copied_with_uncertainty_and_unit(
+    stage: Stage, qtbot: QtBot
+) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
+    rows = rows_of(stage, "Results")
+    qtbot.mouseClick(rows, Qt.MouseButton.LeftButton, pos=rows._place(1).center())
+    assert rows.selected == (1,)
+    qtbot.keyClick(rows, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    period = stage.presenter.state.rows[1]
+    assert copied_lines() == [
+        ["symbol", "quantity", "value", "u", "unit"],
+        ["T", period.name, "319.942", "0.048", "ms"],
+    ]
+    qtbot.keyClick(rows, Qt.Key.Key_Up)
+    qtbot.keyClick(rows, Qt.Key.Key_Down, Qt.KeyboardModifier.ShiftModifier)
+    assert rows.selected == (0, 1)
+    assert "319.942; 0.048; ms" in rows.accessibleDescription()
+    place = rows._place(0).center()
+    qtbot.mouseClick(rows, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.ControlModifier, place)
+    assert rows.selected == (1,)
+    qtbot.keyClick(rows, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+    qtbot.keyClick(rows, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+    lines = copied_lines()
+    assert [line[0] for line in lines[1:3]] == ["f_d", "T"]
+    assert len(lines) == 1 + len(stage.presenter.state.rows)
+
+
+def test_laws_classical_figures_and_budget_are_copied_too(stage: Stage, qtbot: QtBot) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(of_stand())
+    stage.screen._results.show_classical(
+        (ClassicalRow("f<sub>d</sub>", "from u<sub>s</sub> alone", "0.1000, 0.1288", "0.1000"),)
+    )
+    copied = {}
+    for name in ("Friction laws", "Classical figures", "Uncertainty of fd"):
+        rows = rows_of(stage, name)
+        rows.select_all()
+        qtbot.keyClick(rows, Qt.Key.Key_C, Qt.KeyboardModifier.ControlModifier)
+        copied[name] = copied_lines()
+    shown = stage.presenter.state.models[0]
+    assert copied["Friction laws"][1] == [
+        shown.law,
+        shown.effects,
+        shown.friction,
+        shown.ratio,
+        shown.status.text,
+    ]
+    assert copied["Classical figures"][1] == ["f_d", "from us alone", "0.1000, 0.1288", "0.1000"]
+    assert [line[1] for line in copied["Uncertainty of fd"][1:]] == [
+        row.value for row in stage.presenter.state.budget
+    ]
+    law = rows_of(stage, "Friction laws")
+    assert law._place(0).height() > law._place(1).height(), "the line of its effects belongs to a law"
