@@ -192,10 +192,10 @@ class ResultPanel(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self._name = label(role=TextRole.HEADING)
+        self._name = label(role=TextRole.HEADING, wrap=True)
         self._headline = ValueLabel(TextRole.INSTRUCTION, TextRole.NUMBER)
         self._comparison = label(muted=True, wrap=True)
-        self._model_status = label(role=TextRole.HEADING)
+        self._model_status = label(role=TextRole.HEADING, wrap=True)
         self._fit = label(muted=True, wrap=True)
         self._rows = _value_labels(_RESULT_ROWS_MAX)
         self._end_status = label(wrap=True)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QTextDocumentFragment
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtGui import QResizeEvent, QTextDocumentFragment
+from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
 
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Tone
 from app.presenters.results import ResultRow
@@ -16,6 +16,8 @@ from messages.i18n import gettext
 
 _Value = TypeVar("_Value")
 _Fill = TypeVar("_Fill")
+_NUMBER_GAP = 8  # pixels between a number and its uncertainty
+_SLACK = 0.97  # figures grow in whole pixels: not quite in proportion to their font
 _SYMBOL = re.compile(r"\b([fuva])_(d|s|max)\b")
 _MARKUP = re.compile(r"</?\w+>|&\w+;")
 
@@ -87,24 +89,31 @@ def break_path(path: str) -> str:
 
 
 class ValueLabel(QWidget):
-    """A number in large figures with its uncertainty and unit in smaller ones, and its name above it."""
+    """A number in large figures with its uncertainty and unit in smaller ones, and its name above it.
+
+    Where they do not fit beside one another the uncertainty stands below; then the figures become smaller.
+    """
 
     def __init__(self, value: TextRole, spread: TextRole, *, named: bool = False) -> None:
         super().__init__()
         self._named = named
-        self._name = label(role=TextRole.LABEL, muted=True)
+        self._name = label(role=TextRole.LABEL, muted=True, wrap=True)
+        self._roles = (value, spread)
         self._value = label(role=value)
         self._spread = label(role=spread)
-        numbers = QHBoxLayout()
-        numbers.setSpacing(8)
-        numbers.addWidget(self._value, 0, Qt.AlignmentFlag.AlignBaseline)
-        numbers.addWidget(self._spread, 1, Qt.AlignmentFlag.AlignBaseline)
+        for part in (self._value, self._spread):
+            part.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self._numbers = QHBoxLayout()
+        self._numbers.setSpacing(_NUMBER_GAP)
+        self._numbers.addWidget(self._value, 0, Qt.AlignmentFlag.AlignBaseline)
+        self._numbers.addWidget(self._spread, 1, Qt.AlignmentFlag.AlignBaseline)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(0)
         layout.addWidget(self._name)
-        layout.addLayout(numbers)
+        layout.addLayout(self._numbers)
         self._name.setVisible(named)
+        self.setMinimumWidth(1)  # of the column, not of the figures
 
     def show_row(self, row: ResultRow | None) -> None:
         self.setVisible(row is not None)
@@ -113,7 +122,30 @@ class ValueLabel(QWidget):
         if self._named:
             self._name.setText(f"{row.symbol}\u2002{row.name}")
         self._value.setText(row.value)
-        self._spread.setText(row.uncertainty_text)
+        set_text_or_hide(self._spread, row.uncertainty_text)
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        shown = [part for part in (self._value, self._spread) if part.text()]
+        self._scale_fonts(1.0)
+        widths = [part.sizeHint().width() for part in shown]
+        is_wide = sum(widths) + _NUMBER_GAP * (len(widths) - 1) > self.width()
+        ways = QBoxLayout.Direction
+        self._numbers.setDirection(ways.TopToBottom if is_wide else ways.LeftToRight)
+        widest = max(widths, default=0)
+        if widest > self.width() > 0:
+            self._scale_fonts(_SLACK * self.width() / widest)
+
+    def _scale_fonts(self, factor: float) -> None:
+        for part, role in zip((self._value, self._spread), self._roles, strict=True):
+            scaled = font(role)
+            scaled.setPointSizeF(factor * scaled.pointSizeF())
+            if part.font() != scaled:
+                part.setFont(scaled)
 
 
 class ValueGrid(QWidget):

@@ -715,3 +715,25 @@ def test_laws_classical_figures_and_budget_are_copied_too(stage: Stage, qtbot: Q
     ]
     law = rows_of(stage, "Friction laws")
     assert law._place(0).height() > law._place(1).height(), "the line of its effects belongs to a law"
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+@pytest.mark.parametrize("friction", [Quantity.normal(-0.1003, 6.4e-12, "1"), None])
+def test_the_main_result_fits_the_column_in_a_window_of_1280(
+    theme: Theme,
+    qtbot: QtBot,
+    friction: Quantity | None,
+    language: str,
+    use_language: Callable[[str], None],
+) -> None:
+    use_language(language)
+    stage = Stage(theme, qtbot)
+    stage.presenter.on_opening(RUN)
+    results = {row.name: Quantity.normal(-12.3456789, 1.23e-9, row.unit) for row in CATALOGUE}
+    del results["friction_dynamic"]
+    stage.presenter.on_analysed(
+        replace(with_scan(), results=results | ({"friction_dynamic": friction} if friction else {}))
+    )
+    for _ in range(3):
+        QApplication.processEvents()
+    assert clipped_words(stage.screen) == []

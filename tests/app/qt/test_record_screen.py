@@ -1,6 +1,7 @@
 """The Record screen draws what its state says and tells what the operator does."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -325,3 +326,28 @@ def test_the_result_is_zoomed_into_long_after_the_run(stage: Stage) -> None:
     hand.drag(hand.place(0.5, 0.5), hand.place(0.4, 0.5), Qt.MouseButton.MiddleButton)
     QApplication.processEvents()
     assert stage.presenter.state.traces.table.time_s[-1] > line.time_s[-1]
+
+
+@pytest.mark.parametrize("language", ["en", "ru"])
+@pytest.mark.parametrize(
+    "friction", [Quantity.normal(0.1003, 6.4e-9, "1"), Quantity.normal(-0.1003, 6.4e-13, "1"), None]
+)
+def test_the_main_result_fits_its_card_in_a_window_of_1280(
+    theme: Theme,
+    qtbot: QtBot,
+    friction: Quantity | None,
+    language: str,
+    use_language: Callable[[str], None],
+) -> None:
+    use_language(language)
+    stage = Stage(theme, qtbot)
+    stage.screen.resize(1190, 760)
+    tail(stage)
+    stage.play(10.0, END_S + 0.1)
+    found = analysed().results
+    others = {name: quantity for name, quantity in found.items() if not name.startswith("friction")}
+    precise = {name: replace(quantity, standard_uncertainty=1e-12) for name, quantity in others.items()}
+    stage.presenter.dispatch(analysed(results=precise | ({"friction_dynamic": friction} if friction else {})))
+    for _ in range(3):
+        QApplication.processEvents()
+    assert clipped_words(stage.screen) == []

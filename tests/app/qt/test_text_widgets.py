@@ -1,9 +1,14 @@
 """Texts as the window sets them."""
 
 import pytest
-from looking import plain
+from looking import clipped_words, plain
+from PySide6.QtWidgets import QApplication, QBoxLayout, QWidget
+from pytestqt.qtbot import QtBot
 
-from app.qt.widgets.text import label, set_subscripts
+from app.presenters.results import ResultRow
+from app.qt.theme import TextRole, Theme, font
+from app.qt.widgets.layouts import make_column
+from app.qt.widgets.text import ValueLabel, label, set_subscripts
 
 
 @pytest.mark.parametrize(
@@ -22,3 +27,54 @@ def test_symbols_in_sentences_are_set(said: str, seen: str) -> None:
 
 def test_a_label_shows_no_markup(qapp: object) -> None:
     assert plain(label("f_s < f_d & more").text()) == "fs < fd & more"
+
+
+LONG = (
+    ResultRow("f<sub>d</sub>", "dynamic friction coefficient", "0.10030", "0.00064"),
+    ResultRow("f<sub>d</sub>", "dynamic friction coefficient", "0.100301234", "0.000000064"),
+    ResultRow("T", "period of the joint motion", "−12345.678901", "0.000048", "ms"),
+    ResultRow(
+        "T", "period of the joint motion", "319.9421234567890123456789", "0.0000000000000000000048", "ms"
+    ),
+    ResultRow("f<sub>d</sub>", "коэффициент трения скольжения", "не определено"),
+    ResultRow("", "", "Nothing has come out of this"),
+)
+
+
+@pytest.mark.parametrize("width", [150, 330, 346, 600])
+@pytest.mark.parametrize("row", LONG, ids=lambda row: row.value)
+@pytest.mark.parametrize(
+    "roles", [(TextRole.INSTRUCTION, TextRole.NUMBER), (TextRole.NUMBER, TextRole.HEADING)]
+)
+def test_a_number_fits_its_column_at_any_number_of_digits(
+    qtbot: QtBot, roles: tuple[TextRole, TextRole], row: ResultRow, width: int
+) -> None:
+    column = QWidget()
+    shown = ValueLabel(*roles, named=True)
+    make_column(shown, of=column)
+    qtbot.addWidget(column)
+    column.resize(width, 300)
+    column.show()
+    qtbot.waitExposed(column)
+    shown.show_row(row)
+    QApplication.processEvents()
+    assert column.width() == width
+    assert clipped_words(column) == []
+    texts = [part.text() for part in (shown._value, shown._spread) if part.isVisible()]
+    assert " ".join(texts) == f"{row.value} {row.uncertainty_text}".strip()
+
+
+def test_a_number_is_as_large_as_its_column_allows(qtbot: QtBot, theme: Theme) -> None:
+    shown = ValueLabel(TextRole.INSTRUCTION, TextRole.NUMBER)
+    qtbot.addWidget(shown)
+    shown.resize(600, 120)
+    shown.show_row(LONG[1])
+    assert shown._value.font() == font(TextRole.INSTRUCTION)
+    assert shown._numbers.direction() is QBoxLayout.Direction.LeftToRight
+    shown.resize(330, 120)
+    QApplication.sendPostedEvents()
+    assert shown._value.font() == font(TextRole.INSTRUCTION)
+    assert shown._numbers.direction() is QBoxLayout.Direction.TopToBottom
+    shown.resize(600, 120)
+    shown.show_row(LONG[1])
+    assert shown._numbers.direction() is QBoxLayout.Direction.LeftToRight
