@@ -49,6 +49,7 @@ class SelectableRows(QFrame):
         self._rows = rows
         self._selected: frozenset[int] = frozenset()
         self._anchor = self._current = 0
+        grid.setContentsMargins(0, 0, 0, 0)
         self.setLayout(grid)
         self.setProperty("role", "rows")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
