@@ -40,6 +40,7 @@ class LivePlots(QWidget):
         self._scale = unit.scale / MILLIMETRE.scale
         for plot in self._stack.plots:
             plot.left.setScale(self._scale)
+        self.set_run_name("")
         self._stack.resized.connect(self.resized)
         self._stack.hovered.connect(self._hover)
         self._traces = Traces()
@@ -54,6 +55,10 @@ class LivePlots(QWidget):
         self._stack.setAccessibleName(gettext("Live traces of table displacement and relative displacement"))
         theme.changed.connect(self._restyle)
         self._restyle()
+
+    def set_run_name(self, name: str) -> None:
+        """Name the run in the files of the plots; none while it is recorded."""
+        self._stack.export_name = name or gettext("live traces")
 
     def show_traces(self, traces: Traces) -> None:
         if traces is self._traces:

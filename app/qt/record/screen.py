@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 from PySide6.QtCore import Qt
@@ -110,6 +111,7 @@ class RecordScreen(QWidget):
             self._plan.open_with(self._shown.plan, self._shown.choices.series)
 
     def _show_result(self, result: Result | None) -> None:
+        self._plots.set_run_name("" if result is None else Path(result.path).stem)
         if result is not None:
             self._result.show_result(result)
         self._column.stack.setCurrentIndex(int(result is not None))

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from PySide6.QtCore import QBuffer, QIODevice, QPoint, QRect, QSaveFile, Qt
+from PySide6.QtCore import QBuffer, QIODevice, QPoint, QRect, QSaveFile, QStandardPaths, Qt
 from PySide6.QtGui import QGuiApplication, QPainter
 from PySide6.QtSvg import QSvgGenerator
 from PySide6.QtWidgets import QFileDialog, QGraphicsItem, QGraphicsView, QMessageBox, QWidget
@@ -23,7 +23,8 @@ def copy_picture(shown: QWidget) -> None:
 
 def ask_for_file(parent: QWidget, suffix: str, name: str, content: Callable[[], bytes]) -> None:
     """Let the operator choose a file, and write the content into it; a fault is shown in a line."""
-    dialog = QFileDialog(parent, gettext("Save"))
+    documents = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
+    dialog = QFileDialog(parent, gettext("Save"), documents)
     dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
     dialog.setNameFilter(gettext(FORMATS[suffix]))
     dialog.setDefaultSuffix(suffix)

@@ -275,6 +275,17 @@ def shown_span(stage: Stage) -> tuple[float, float]:
     return stage.screen._plots._stack.time_range()
 
 
+def test_files_of_the_plots_have_the_name_of_the_run_that_is_shown(stage: Stage) -> None:
+    tail(stage)
+    stack = stage.screen._plots._stack
+    assert stack.export_name == "live traces"
+    stage.play(10.0, END_S + 0.1)
+    stage.presenter.dispatch(analysed())
+    assert stack.export_name == "20260112_1FFM0_001"
+    titles = [curve.title for curve in stack.curves_in_view()]
+    assert titles == ["table displacement, mm", "relative displacement, mm"]
+
+
 def test_a_zoomed_part_is_drawn_finely_and_stays_while_samples_come(stage: Stage) -> None:
     tail(stage)
     coarse = stage.presenter.state.traces.table
