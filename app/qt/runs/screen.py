@@ -24,8 +24,8 @@ from messages.i18n import N_, gettext, ngettext
 if TYPE_CHECKING:
     from app.qt.window import MainWindow
 
-_COLUMN_SHARE = 0.30
-_COLUMN_WIDTHS = (360, 620)
+_COLUMN_SHARE = 0.28
+_COLUMN_WIDTHS = (344, 620)
 _ALL_SERIES = N_("All series")
 
 

@@ -28,7 +28,7 @@ _MEASURED = {Column.FRICTION: "f_d", Column.PERIOD: "T", Column.DAMPING: "n1"}
 """Symbols in the titles of copied columns, where the uncertainty has a column of its own."""
 _RIGHT = {*_MEASURED, Column.DURATION, Column.TEMPERATURE}
 _WIDTHS = {
-    Column.NAME: 46,
+    Column.NAME: 60,
     Column.DATE: 132,
     Column.SERIES: 66,
     Column.FRICTION: 140,

@@ -23,6 +23,7 @@ from app.qt.theme import Theme
 from app.qt.widgets.tables import shown_columns
 from app.runs.metadata import Conditions, RunSource
 from app.runs.summary import RunSummary
+from messages.i18n import gettext
 
 RUNS = tuple(
     RunSummary(
@@ -189,6 +190,8 @@ def test_a_window_of_1280_shows_the_usual_columns_without_scrolling_sideways(
         assert table.columnWidth(number) >= table.sizeHintForIndex(table.model().index(0, number)).width(), (
             column
         )
+        title = table.horizontalHeader().fontMetrics().horizontalAdvance(gettext(column.value))
+        assert table.columnWidth(number) >= title + 16, column
     assert table.columnWidth(column_of(Column.NOTE)) >= 44
 
 
