@@ -24,7 +24,7 @@ from analysis.laws.catalogue import COMPARED_LAWS, PARAMETER_COUNT
 from analysis.laws.law import FrictionLaw
 from analysis.laws.parameters import Parameter
 from analysis.laws.stand_parts import EFFECTS
-from analysis.plate.friction import estimate_plate_friction
+from analysis.plate.friction import PlateFriction, estimate_plate_friction
 from analysis.preparation.extension import extend_decay, refine_tail
 from analysis.preparation.free_decay import FreeDecay, prepare
 from analysis.quantities import BudgetSource, OtherLaw, Quantity
@@ -61,6 +61,9 @@ _AGAIN = 1.1  # a search is not repeated before the record is longer by this fac
 _AFTER_FAILURE = 2.0  # ... where it found no law that fits: on such a stand the next finds none either
 _LIKELY = 20.0  # of the BIC with some readings: laws above the best by more stay out with all of them
 _AGREE_SIGMAS = 3.0  # of the plate alone: a law that is all but adequate is shown where both agree so well
+_CONTRADICTION = (
+    0.2  # of f_d between the plate and all laws: gauges that do not show the table mislead the plate
+)
 _SPREAD_OF_PLATE = 0.005  # of f_d: stands that no law explains mislead the plate so far, by study_real_stand
 _STEPS = 3
 _ENDED = object()  # in place of a step of a search
@@ -219,7 +222,7 @@ class LiveIdentification:
             decay = decay.with_tail_from(decay.slip_end_s + 2.0 * ROUGH_END_PERIODS * decay.period_s)
         if last is not None and _have_same_slips(last.decay, decay):
             friction = last.state.friction_dynamic_plate
-        elif (plate := estimate_plate_friction(record, decay)) is not None and plate.misfit < MISFIT_MAX:
+        elif (plate := estimate_plate_friction(record, decay)) is not None and self._may_hold(plate):
             deviation = float(np.hypot(plate.standard_uncertainty, _SPREAD_OF_PLATE * plate.friction_dynamic))
             friction = Quantity.normal(plate.friction_dynamic, deviation, "1")
         to_record = decay.channels.to_record_time
@@ -236,6 +239,12 @@ class LiveIdentification:
         )
         self._by_plate = _PlateFit(state, decay, now_s)
         return state
+
+    def _may_hold(self, plate: PlateFriction) -> bool:
+        """Whether neither its own readings nor all laws contradict friction from the plate alone."""
+        found = [point[Parameter.FRICTION_DYNAMIC] for point in self._minima.values()]
+        is_near = any(abs(plate.friction_dynamic / value - 1.0) < _CONTRADICTION for value in found)
+        return plate.misfit < MISFIT_MAX and (is_near or not found)
 
     def _analyse_again(self, record: Record, now_s: float) -> "_LiveFit | LiveState":
         """Analyse the whole record again, as if it were complete."""
