@@ -67,6 +67,34 @@ MODEL: Final = record(
         "tried": listed(record({"name": TEXT, "bic": NUMBER, "residual_rms_m": NUMBER})),
     }
 )
+PROGRAM: Final = {"program": TEXT, "version": TEXT, "commit": optional(TEXT), "date": TEXT}
+SOURCE: Final[Schema] = {"enum": ["real", "simulated", "imported"]}
+ORIGIN_OF_RUN: Final = PROGRAM | {
+    "request": keyed({"type": ["string", "number"]}, "What was asked for: law, kind, options given."),
+    "request_hash": TEXT,
+    "inputs_hash": TEXT,
+    "run_identifier": TEXT,
+    "source": SOURCE,
+    "masses": keyed(NUMBER),
+    "gravity_m_per_s2": NUMBER,
+    "reproduce": TEXT,
+}
+ORIGIN: Final = record(
+    ORIGIN_OF_RUN | {"calibrations": keyed(record({"identity": TEXT}), "By gauge: table, relative.")},
+    description="What made a result, and of what; `reproduce` is the command that gives the same digits.",
+)
+ORIGIN_OF_TABLE: Final = record(
+    PROGRAM
+    | {
+        "source": TEXT,
+        "inputs_hash": TEXT,
+        "reproduce": TEXT,
+        "calibrations": keyed(record({"identity": TEXT}), "By identity."),
+        "runs": listed(
+            record(ORIGIN_OF_RUN | {"run": TEXT, "analysis": optional(COUNT), "calibrations": keyed(TEXT)})
+        ),
+    }
+)
 ANALYSIS: Final = record(
     {
         "schema": {"const": "slipstand-analysis/1"},
@@ -80,6 +108,7 @@ ANALYSIS: Final = record(
         "warnings": listed(WARNING),
         "quality": record(dict.fromkeys(("samples", "missing", "damaged", "overloaded"), COUNT)),
     },
+    {"origin": ORIGIN},
 )
 FAILURE: Final = record({"run": TEXT, "error": TEXT})
 TABLE_MASS: Final = record(
@@ -111,6 +140,7 @@ SCHEMAS: Final[dict[str, tuple[str, Schema]]] = {
                 "excluded": listed(record({"run": TEXT, "reason": TEXT})),
                 "failures": listed(FAILURE),
                 "warnings": listed(WARNING),
+                "origin": ORIGIN_OF_TABLE,
             }
         ),
     ),
