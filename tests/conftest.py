@@ -42,6 +42,7 @@ REALTIME_FILES = {
     "test_live_recording.py",
     "test_stand_process.py",
     "test_whole_flow.py",
+    "test_day_by_keys.py",
     "test_firmware_record.py",
 }
 

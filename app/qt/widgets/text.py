@@ -46,7 +46,7 @@ def show_chip(target: QLabel, chip: Chip) -> None:
     mark = {"ok": "✓ ", "warn": "▲ ", "bad": "■ "}.get(chip.tone.value, "")
     target.setText(set_subscripts(mark + chip.text) if chip.text else "")
     target.setToolTip(chip.hint)
-    target.setVisible(bool(chip.text))
+    _set_shown(target, bool(chip.text))
     set_property(target, "tone", chip.tone.value)
 
 
@@ -57,7 +57,13 @@ def stopped_chip(stopped_at: str) -> Chip:
 
 def set_text_or_hide(target: QLabel, text: str) -> None:
     target.setText(text)
-    target.setVisible(bool(text))
+    _set_shown(target, bool(text))
+
+
+def _set_shown(part: QWidget, shown: bool) -> None:
+    """Show or hide a part; one without a parent yet would be a window of its own, which takes the focus."""
+    if part.parentWidget() is not None or not shown:
+        part.setVisible(shown)
 
 
 def padded(values: Sequence[_Value], count: int, fill: _Fill) -> list[_Value | _Fill]:
@@ -116,7 +122,7 @@ class ValueLabel(QWidget):
         self.setMinimumWidth(1)  # of the column, not of the figures
 
     def show_row(self, row: ResultRow | None) -> None:
-        self.setVisible(row is not None)
+        _set_shown(self, row is not None)
         if row is None:
             return
         if self._named:

@@ -3,13 +3,16 @@
 from collections.abc import Iterator
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QToolButton, QWidget
 from pytestqt.qtbot import QtBot
-from stage import END_S, analysed
+from stage import END_S, RUN, analysed
+from test_identify_screen import with_scan
 from test_main_window import Desk
 
-from app.presenters.base import Notice
+from app.presenters.base import Chip, Notice, Tone
+from app.presenters.gauges.state import PortCard
+from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import MoveToTrash
 from app.presenters.screens import Screen
 from app.qt.theme import Theme
@@ -108,3 +111,33 @@ def test_neither_arm_nor_stop_has_the_focus_while_a_run_is_recorded(desk: Desk) 
     press(desk, Qt.Key.Key_Space)
     press(desk, Qt.Key.Key_Return)
     assert desk.presenter.record.is_recording
+
+
+class ShownWindows(QObject):
+    """Keeps the widgets that were shown as windows."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def eventFilter(self, shown: QObject, event: QEvent) -> bool:  # noqa: N802
+        if event.type() == QEvent.Type.Show and isinstance(shown, QWidget) and shown.isWindow():
+            self.found.append(type(shown).__name__)
+        return False
+
+
+def test_no_part_of_a_screen_is_a_window_for_a_moment_which_would_take_the_focus(desk: Desk) -> None:
+    application, windows = QApplication.instance(), ShownWindows()
+    assert application is not None
+    for screen in Screen:
+        desk.presenter.show_screen(screen)
+    application.installEventFilter(windows)
+    desk.presenter.open_run(RUN)
+    desk.worker.calls[-1].done(with_scan())
+    card = PortCard("COM7", "FTDI", Chip("GSV-8", Tone.OK), suggested_form=ConnectForm("COM7", "gsv"))
+    desk.presenter.gauges.ports._update(ports=(card,))
+    QApplication.processEvents()
+    application.removeEventFilter(windows)
+    assert windows.found == []
+    assert desk.window.isActiveWindow()
+    assert focused() is desk.window.home()
