@@ -49,7 +49,9 @@ def find_stopped_table(tail: Channel, period_s: float, noise_m: float) -> float 
 
     `tail` is gauge 1 without slip. A swing that decays freely loses less and less from period to period.
     """
-    edges = np.arange(tail.time_s[0], tail.time_s[-1], period_s) if len(tail) else np.zeros(0)
+    if not len(tail) or tail.time_s[-1] - tail.time_s[0] > len(tail) * period_s:
+        return None  # less than one reading a period: the clock jumped
+    edges = np.arange(tail.time_s[0], tail.time_s[-1], period_s)
     periods = [tail.between(first, first + period_s).value_m for first in edges[:-1]]
     if len(periods) < _SWINGS_MIN or min(len(values) for values in periods) < _SWINGS_MIN:
         return None

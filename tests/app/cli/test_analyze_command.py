@@ -13,6 +13,7 @@ from app.cli.simulate import simulate
 from app.runs.reader import open_run
 
 SCHEMA_KEYS = {
+    "origin",
     "schema",
     "run",
     "series",

@@ -14,7 +14,7 @@ from app.reports.table import files
 
 LISTS = ((), ("calibrate",), ("device",))
 COMMANDS = (
-    "demo", "record", "analyze", "simulate", "plan", "import", "export", "table", "figures", "report", "runs",
+    "demo", "record", "analyze", "simulate", "plan", "import", "watch", "export", "table", "figures", "report", "runs",
     "recover", "edit", "trash", "audit", "doctor", "calibrate", "calibrate check", "device list",
     "device ports", "device probe", "device simulate", "device health",
 )  # fmt: skip

@@ -15,7 +15,9 @@ def test_report_is_written_and_told(slipstand, run, tmp_path):
     said = slipstand("report", run, "-o", target, "--date", "2026-11-21", "--json")
 
     assert said.code == 0
-    assert said.json == {"report": str(target), "date": "2026-11-21", "runs": [str(run)], "failures": []}
+    told = {"report": str(target), "date": "2026-11-21", "runs": [str(run)], "failures": []}
+    assert said.json == told | {"origin": said.json["origin"]}
+    assert said.json["origin"]["reproduce"].startswith("slipstand report")
     first = target.read_bytes()
     assert first.startswith(b"%PDF")
     again = slipstand("report", run, "-o", target, "--date", "2026-11-21", "--force")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from looking import visible_words
 from PySide6.QtCore import Qt, QTimer
-from PySide6.QtWidgets import QApplication, QDialog, QFileDialog, QPushButton, QToolButton, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QDialog, QFileDialog, QWidget
 from pytestqt.qtbot import QtBot
 from test_whole_flow import QUICK, seconds_after_release
 
@@ -58,7 +58,7 @@ class Operator:
         """Go on by Tab until a button has the focus."""
         for _ in range(60):
             button = self.focused()
-            if isinstance(button, QPushButton | QToolButton) and button.text().startswith(text):
+            if isinstance(button, QAbstractButton) and button.text().startswith(text):
                 return
             self.press(key)
         pytest.fail(f"Tab does not reach {text!r}")
@@ -143,8 +143,10 @@ def plan(operator: Operator) -> None:
     operator.dialog(PlanDialog)
     operator.write("3FFM0 x2")
     operator.press(Qt.Key.Key_Return)
+    operator.tab_to("Simulated runs count")
+    operator.press(Qt.Key.Key_Space)
     operator.leave_dialog()
-    assert "Plan 1/2" in operator.words()
+    operator.wait(lambda: "Plan 1/2" in operator.words())
 
 
 def review(operator: Operator, kept: Path) -> None:

@@ -132,7 +132,8 @@ def test_no_word_is_cut_off_where_a_run_is_decided_about(stage: Stage, width: in
     stage.screen.resize(width, 700)
     stage.record()
     stage.press(Qt.Key.Key_F2)
-    QApplication.processEvents()
+    for _ in range(3):  # numbers that fit their column change its layout
+        QApplication.processEvents()
     assert clipped_words(stage.screen) == []
 
 

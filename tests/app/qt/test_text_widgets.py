@@ -68,11 +68,12 @@ def test_a_number_is_as_large_as_its_column_allows(qtbot: QtBot, theme: Theme) -
     shown = ValueLabel(TextRole.INSTRUCTION, TextRole.NUMBER)
     qtbot.addWidget(shown)
     shown.resize(600, 120)
+    shown.show()  # a hidden widget is not told of its size
     shown.show_row(LONG[1])
     assert shown._value.font() == font(TextRole.INSTRUCTION)
     assert shown._numbers.direction() is QBoxLayout.Direction.LeftToRight
     shown.resize(330, 120)
-    QApplication.sendPostedEvents()
+    QApplication.processEvents()
     assert shown._value.font() == font(TextRole.INSTRUCTION)
     assert shown._numbers.direction() is QBoxLayout.Direction.TopToBottom
     shown.resize(600, 120)

@@ -54,11 +54,9 @@ def test_columns_are_named_by_quantity_and_unit(tmp_path, metadata, quantity, un
         tmp_path / "run.csv",
     )
     header, first, *_ = (tmp_path / "run.csv").read_text().splitlines()
-    assert (
-        header
-        == f"time_s,table_{quantity}_{name},relative_{quantity}_{name},status,table_count,relative_count"
-    )
-    assert first == "0.0,0.0,0.001,0,0,1000"
+    readings = f"table_{quantity}_{name},relative_{quantity}_{name}"
+    assert header == f"time_s,{readings},status,table_count,relative_count,simulated"
+    assert first == "0.0,0.0,0.001,0,0,1000,1"
 
 
 def test_replacing_is_asked_for(tmp_path, metadata):
