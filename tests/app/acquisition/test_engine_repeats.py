@@ -48,7 +48,8 @@ def test_a_plate_too_far_off_is_said_at_once_with_where_it_belongs(tmp_path):
     with stand(plate_offset_m=0.016, recentre_every=1) as simulated:
         (ended,) = record_runs(port_of(simulated), run_in(tmp_path), *FILES, listen)
     assert asked[0].plate_m == pytest.approx(0.016, abs=1e-4)
-    assert (asked[0].plate_wanted_m, asked[0].side) == (0.0, 0)
+    told = next(position for position in asked if position.plate_wanted_m is not None)
+    assert (told.plate_wanted_m, told.side) == (0.0, 0)
     assert "was not pushed back before the pull" in str(ended.message)
 
 

@@ -14,9 +14,9 @@ from app.reports.table import files
 
 LISTS = ((), ("calibrate",), ("device",))
 COMMANDS = (
-    "demo", "record", "analyze", "simulate", "plan", "import", "watch", "export", "table", "figures", "report", "runs",
-    "recover", "edit", "trash", "audit", "doctor", "calibrate", "calibrate check", "device list",
-    "device ports", "device probe", "device simulate", "device health",
+    "demo", "record", "analyze", "simulate", "plan", "import", "watch", "export", "table", "figures",
+    "report", "runs", "recover", "edit", "trash", "audit", "doctor", "calibrate", "calibrate check",
+    "device list", "device ports", "device probe", "device simulate", "device health",
 )  # fmt: skip
 UNIT = re.compile(
     r"\((m|m/s|mm|kg|s|Hz|kg/s|1/s|N/m|rad|ppm|%|degrees C|s since 1970|mm, or counts[^)]*)\)"

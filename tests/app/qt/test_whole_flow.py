@@ -36,6 +36,8 @@ PATIENCE_MS = 60_000
 def presenter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> WindowPresenter:
     monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path))
     monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path / "config"))
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config" / "settings.toml").write_text("count_simulated = true\n")
     return make_window_presenter(QUICK)
 
 
