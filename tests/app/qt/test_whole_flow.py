@@ -129,7 +129,7 @@ def export_coefficients(window: MainWindow, presenter: WindowPresenter, qtbot: Q
     runs = presenter.runs
     qtbot.waitUntil(lambda: bool(runs.state.rows), timeout=PATIENCE_MS)
     runs.select((str(path),))
-    (ask,) = [b for b in window.findChildren(QPushButton) if b.text() == "Export…"]
+    (ask,) = [b for b in window.findChildren(QPushButton) if b.text() == "Export…" and b.isVisible()]
     qtbot.waitUntil(ask.isEnabled, timeout=PATIENCE_MS)
     qtbot.mouseClick(ask, Qt.MouseButton.LeftButton)
     runs.export_dialog.set_format("json")
