@@ -203,17 +203,19 @@ def zoom_and_pan(app: QApplication, theme: Theme, frames: Frames, count: int) ->
         (view,) = plots.findChildren(pg.GraphicsView)
         for what, gesture in (("zoom", zoom), ("pan", pan)):
             frames.clear()
-            took = []
+            took, busy = [], []
             for number in range(count):
                 if gesture is pan and number % PAN_FRAMES == 0:
                     begin_pan(view.viewport(), number // PAN_FRAMES)
                 time.sleep(BETWEEN_MOVES_S)
-                began = time.perf_counter()
+                began, began_busy = time.perf_counter(), time.thread_time()
                 gesture(view.viewport(), number)
                 view.viewport().repaint()
                 took.append(time.perf_counter() - began)
+                busy.append(time.thread_time() - began_busy)
             frames.check(count)
             tell(f"{what}, hour at {RATE_HZ:g} Hz on {name}, {SIZE[0]} x {SIZE[1]}", took)
+            tell("  of which processor time", busy)
         plots.close()
 
 

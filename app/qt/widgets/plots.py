@@ -378,5 +378,7 @@ def value_extent(*lines: Floats) -> tuple[float, float]:
 
 def _write(item: Any, text: str, text_colour: str) -> None:
     """Set the text of a label; a wide one is cut instead of moving the plot."""
-    item.setText(f'<span style="color: {text_colour}; font-size: 12px">{text}</span>')
-    item.setMinimumWidth(0.0)
+    styled = f'<span style="color: {text_colour}; font-size: 12px">{text}</span>'
+    if styled != item.text:  # to lay a text out takes as long as to draw a curve
+        item.setText(styled)
+        item.setMinimumWidth(0.0)
