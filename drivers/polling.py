@@ -209,11 +209,18 @@ class ResponseTiming:
         """Whether a measurement is at its place in the grid: a row has the time of its cell."""
         return abs(self._deviation_ns(request, transaction, schedule)) <= schedule.tolerance_ns
 
-    def update(self, request: int, transaction: Transaction, schedule: PollSchedule) -> None:
-        """Add a response to the timing; one off schedule too, because the device may have become slower."""
-        self._shortest_s = min(self._shortest_s, transaction.duration_s)
-        off_ns, most_ns = self._deviation_ns(request, transaction, schedule), schedule.tolerance_ns
-        self._phases_ns[request] += round(_SMOOTHING * max(-most_ns, min(off_ns, most_ns)))
+    def update(self, answered: Sequence[Transaction], schedule: PollSchedule) -> None:
+        """Add the responses of a poll; those off schedule too, because the device may have become slower.
+
+        Requests that were not asked, because the poll ended early, would have been as late as the last one.
+        """
+        most_ns, correction_ns = schedule.tolerance_ns, 0
+        for request in range(len(self._phases_ns)):
+            if request < len(answered):
+                self._shortest_s = min(self._shortest_s, answered[request].duration_s)
+                off_ns = self._deviation_ns(request, answered[request], schedule)
+                correction_ns = round(_SMOOTHING * max(-most_ns, min(off_ns, most_ns)))
+            self._phases_ns[request] += correction_ns
 
     def _deviation_ns(self, request: int, transaction: Transaction, schedule: PollSchedule) -> int:
         return transaction.measured_ns - schedule.due_ns - self._phases_ns[request]

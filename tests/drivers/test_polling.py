@@ -5,7 +5,7 @@ from wire_helpers import ScriptedLink
 
 from drivers.devices.csv_lines.source import LineRequest
 from drivers.devices.modbus.frames import Function, Request, encode_exception, encode_read_response
-from drivers.polling import transact
+from drivers.polling import PollSchedule, ResponseTiming, Transaction, transact
 from drivers.port_probe import query_identity
 from drivers.registry import find_driver
 from drivers.simulated.protocol import CommandParser
@@ -36,6 +36,19 @@ def test_an_echo_is_no_response(request_, answer, is_known, read):
     assert (found.data, found.has_echo) == (read, True)
     without = transact(ScriptedLink(lambda _: answer), request_, 0.01)
     assert (without.data, without.has_echo) == (answer, False)
+
+
+def test_a_poll_that_ends_early_does_not_change_the_skew():
+    """Otherwise the first request alone follows late responses, until the second seems to precede it."""
+    schedule = PollSchedule(100.0)
+
+    def measured(after_ns: int) -> Transaction:
+        return Transaction(b"", schedule.due_ns, schedule.due_ns + 2 * after_ns)
+
+    timing = ResponseTiming([[measured(100_000), measured(300_000)]])
+    for _ in range(50):
+        timing.update([measured(schedule.tolerance_ns + 200_000)], schedule)
+    assert timing.skew_s(0, 1) == pytest.approx(200e-6)
 
 
 class DeviceLink:

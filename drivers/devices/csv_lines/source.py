@@ -326,7 +326,7 @@ class PolledLinesSource(CsvLinesSource):
         is_complete = self._request.is_complete(transaction.data)
         self._answer_overdue = not is_complete
         if is_complete and not is_stale:
-            self._timing.update(0, transaction, self._schedule)
+            self._timing.update([transaction], self._schedule)
         elif transaction.data:
             drain(link)  # so that what comes next is the answer to the next request
         self._schedule.mark_used(transaction.measured_ns)

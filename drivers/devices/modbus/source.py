@@ -154,6 +154,7 @@ class ModbusSource(SampleSource):
         if not schedule.wait():
             return b""
         wrapped, earlier, measured_ns = b"", b"", 0
+        answered: list[Transaction] = []
         for number, planned in enumerate(self._poll.requests):
             found = self._ask(link, planned)
             transaction, response, earlier = found.transaction, found.response, earlier + found.earlier
@@ -168,9 +169,10 @@ class ModbusSource(SampleSource):
                 drain(link)
             self._response_overdue = not found.data
             if not response.fault and not is_stale:
-                timing.update(number, transaction, schedule)
+                answered.append(transaction)
             if is_late or response.fault:
                 break
+        timing.update(answered, schedule)
         if earlier:  # before the responses, because a late one ends the poll that it belongs to
             wrapped = wrap_response(0, measured_ns, earlier, is_late=True) + wrapped
         self._check_silence(bool(wrapped))
