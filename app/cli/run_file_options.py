@@ -116,14 +116,15 @@ class ExportOptions:
     The newest analysis kept in a run is taken, else it is analysed.
     """
 
-    runs: list[Path] = shared.run_files()
-    format_name: str = choice(
+    runs: list[Path] = shared.runs_or_folders()
+    format_name: str | None = choice(
         "--format",
         ("csv", "json", "parquet", "mat", "uff58", "xlsx", "latex", "ro-crate"),
-        "File format.",
-        REQUIRED,
+        "File format; by the ending of -o if absent.",
     )
-    output: Path = option("-o --output", "File to write; a folder for samples of several runs.", REQUIRED)
+    output: Path | None = option(
+        "-o --output", "File to write, or a folder with a file a run; csv, json, latex to stdout if absent."
+    )
     content: str = choice(
         "--content",
         ("both", "samples", "coefficients"),

@@ -32,12 +32,31 @@ and behind what it may take for the end of a cell; full-width signs count as sig
 
 def write_csv_samples(exported: ExportedRun, path: Path) -> None:
     """Samples with all their digits; absent readings are empty."""
-    columns = exported.samples
+    names = [column.name for column in exported.samples]
     with path.open("x", encoding="utf-8", newline="") as file:
-        file.write(",".join(column.name for column in columns) + "\n")
-        for first in range(0, len(columns[0].values), _ROWS_AT_ONCE):
-            cells = [_csv_numbers(column, slice(first, first + _ROWS_AT_ONCE)) for column in columns]
-            file.writelines(",".join(row) + "\n" for row in zip(*cells, strict=True))
+        file.write(",".join(names) + "\n")
+        file.writelines(csv_lines(exported, names))
+
+
+def csv_lines(exported: ExportedRun, names: Sequence[str], run: str | None = None) -> Iterator[str]:
+    """Lines of the columns of these names, behind a cell that names the run if `run` does.
+
+    Cells of a column that the run lacks are empty.
+    """
+    columns = {column.name: column for column in exported.samples}
+    count = len(exported.samples[0].values)
+    for first in range(0, count, _ROWS_AT_ONCE):
+        rows = range(first, min(first + _ROWS_AT_ONCE, count))
+        cells = [] if run is None else [[_quoted(run)] * len(rows)]
+        cells += [_csv_numbers(columns.get(name), rows) for name in names]
+        yield from (",".join(row) + "\n" for row in zip(*cells, strict=True))
+
+
+def _quoted(text: str) -> str:
+    """A cell as the writer of `csv` gives it."""
+    cell, line = csv_cell(text), io.StringIO()
+    csv.writer(line, lineterminator="").writerow([cell])
+    return line.getvalue()
 
 
 def write_csv_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
@@ -59,8 +78,10 @@ def csv_cell(value: Any) -> str:
     return _FORMULA.sub("'", value) if isinstance(value, str) else repr(value)
 
 
-def _csv_numbers(column: SampleColumn, rows: slice) -> list[str]:
-    values = column.values[rows]
+def _csv_numbers(column: SampleColumn | None, rows: range) -> list[str]:
+    if column is None:
+        return [""] * len(rows)
+    values = column.values[rows.start : rows.stop]
     if values.dtype.kind != "f":
         return [str(x) for x in values.tolist()]
     return ["" if x != x else repr(x) for x in values.astype(np.float64).tolist()]
@@ -70,25 +91,26 @@ def _csv_numbers(column: SampleColumn, rows: slice) -> list[str]:
 
 
 def _write_json_run(exported: ExportedRun, path: Path) -> None:
-    """Numbers that are absent or not finite are null."""
+    write_json(path, json_run(exported))
+
+
+def json_run(exported: ExportedRun) -> dict[str, Any]:
+    """A run as JSON; numbers that are absent or not finite are null there."""
     samples = {
         column.name: {"unit": column.unit, "values": column.values.tolist()} for column in exported.samples
     }
     facts = content.run_metadata_document(exported.run)
-    _write_json(
-        path,
-        {"schema": "slipstand-run/1", "name": exported.name}
-        | facts
-        | {"samples": samples, "analysis": exported.analysis},
-    )
+    named = {"schema": "slipstand-run/1", "name": exported.name}
+    return named | facts | {"samples": samples, "analysis": exported.analysis}
 
 
 def _write_json_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
     rows = list(content.coefficient_rows(runs))
-    _write_json(path, {"schema": "slipstand-coefficients/1", "coefficients": rows})
+    write_json(path, {"schema": "slipstand-coefficients/1", "coefficients": rows})
 
 
-def _write_json(path: Path, document: dict[str, Any]) -> None:
+def write_json(path: Path, document: dict[str, Any]) -> None:
+    """Write a JSON document."""
     path.write_bytes(msgspec.json.format(msgspec.json.encode(document), indent=1) + b"\n")
 
 
@@ -96,6 +118,10 @@ def _write_json(path: Path, document: dict[str, Any]) -> None:
 
 
 def _write_parquet_run(exported: ExportedRun, path: Path) -> None:
+    write_parquet(parquet_table(exported), path)
+
+
+def parquet_table(exported: ExportedRun) -> Any:
     """Absent readings are null; the facts are JSON under `slipstand` in the metadata of the table."""
     pa = content.import_optional("pyarrow", "Parquet")
     facts = content.run_metadata_document(exported.run) | {"analysis": exported.analysis}
@@ -105,7 +131,7 @@ def _write_parquet_run(exported: ExportedRun, path: Path) -> None:
     ]
     arrays = [pa.array(column.values, from_pandas=True) for column in exported.samples]
     schema = pa.schema(fields, metadata={"slipstand": msgspec.json.encode(facts)})
-    _write_parquet(pa.Table.from_arrays(arrays, schema=schema), path)
+    return pa.Table.from_arrays(arrays, schema=schema)
 
 
 def _write_parquet_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
@@ -113,10 +139,11 @@ def _write_parquet_coefficients(runs: Iterable[ExportedRun], path: Path) -> None
     numbers = ("value", "standard_uncertainty", "interval_95_low", "interval_95_high")
     kinds = dict.fromkeys(COEFFICIENT_COLUMNS, pa.string()) | dict.fromkeys(numbers, pa.float64())
     schema = pa.schema(list((kinds | {"adequate": pa.bool_()}).items()))
-    _write_parquet(pa.Table.from_pylist(list(content.coefficient_rows(runs)), schema=schema), path)
+    write_parquet(pa.Table.from_pylist(list(content.coefficient_rows(runs)), schema=schema), path)
 
 
-def _write_parquet(table: Any, path: Path) -> None:
+def write_parquet(table: Any, path: Path) -> None:
+    """Write a table of pyarrow."""
     content.import_optional("pyarrow.parquet", "Parquet").write_table(table, path)
 
 
@@ -175,7 +202,23 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\ud800-\udfff\ufffe\uffff]")
 
 
 def _write_xlsx_run(exported: ExportedRun, path: Path) -> None:
-    """The sheets Coefficients, Samples and Run. Raises UnsuitableRunError for more than a sheet holds."""
+    """The sheets Coefficients, Samples and Run."""
+    facts = flat_facts("", content.run_metadata_document(exported.run))
+    sheets: dict[str, Sheet] = {
+        "Coefficients": coefficients_sheet([exported]),
+        "Samples": samples_sheet(exported),
+        "Run": (("fact", "value"), facts),
+    }
+    write_sheets(sheets, path)
+
+
+def coefficients_sheet(runs: Iterable[ExportedRun]) -> Sheet:
+    """A row a quantity of a run."""
+    return COEFFICIENT_COLUMNS, (row.values() for row in content.coefficient_rows(runs))
+
+
+def samples_sheet(exported: ExportedRun) -> Sheet:
+    """A row a sample. Raises UnsuitableRunError for more than a sheet holds."""
     if len(exported.run) >= _SHEET_ROWS and exported.samples:
         raise UnsuitableRunError(
             "{path} has {count} samples, a sheet of xlsx at most {sheet_rows}. Export it as parquet or csv",
@@ -184,17 +227,11 @@ def _write_xlsx_run(exported: ExportedRun, path: Path) -> None:
             sheet_rows=_SHEET_ROWS - 1,
         )
     samples = zip(*(column.values.tolist() for column in exported.samples), strict=True)
-    sheets: dict[str, Sheet] = {
-        "Coefficients": (COEFFICIENT_COLUMNS, (row.values() for row in content.coefficient_rows([exported]))),
-        "Samples": ([column.name for column in exported.samples], samples),
-        "Run": (("fact", "value"), _flat_facts("", content.run_metadata_document(exported.run))),
-    }
-    write_sheets(sheets, path)
+    return [column.name for column in exported.samples], samples
 
 
 def _write_xlsx_coefficients(runs: Iterable[ExportedRun], path: Path) -> None:
-    rows = (row.values() for row in content.coefficient_rows(runs))
-    write_sheets({"Coefficients": (COEFFICIENT_COLUMNS, rows)}, path)
+    write_sheets({"Coefficients": coefficients_sheet(runs)}, path)
 
 
 def write_sheets(sheets: Mapping[str, Sheet], path: Path) -> None:
@@ -213,11 +250,11 @@ def write_sheets(sheets: Mapping[str, Sheet], path: Path) -> None:
     book.save(path)
 
 
-def _flat_facts(prefix: str, facts: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+def flat_facts(prefix: str, facts: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
     """Facts with dotted names, as `metadata.table_mass_kg`."""
     for name, value in facts.items():
         if isinstance(value, dict):
-            yield from _flat_facts(f"{prefix}{name}.", value)
+            yield from flat_facts(f"{prefix}{name}.", value)
         elif isinstance(value, list | tuple):
             yield f"{prefix}{name}", msgspec.json.encode(value).decode()
         else:

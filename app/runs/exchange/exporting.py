@@ -1,6 +1,6 @@
 """From run files to exported ones: what to read, whether to analyse, and where it goes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -19,6 +19,7 @@ from app.runs.exchange.export_formats import (
     unique_names,
     write_csv_coefficients,
 )
+from app.runs.exchange.several_runs import WRITERS as TOGETHER
 from app.runs.metadata import RunSource
 from app.runs.reader import Run, open_run
 from app.runs.saved_analyses import latest_valid
@@ -31,12 +32,25 @@ def write_exported_run(name: str, exported: ExportedRun, path: Path, *, replace:
     """Write a run, and its coefficients beside a CSV file. Returns the files. Raises RunError."""
     with atomic_write(path.absolute(), replace=replace) as made:
         FORMATS[name].write_run(exported, made)
-    if name != "csv" or exported.analysis is None:
-        return [path]
-    beside = path.with_name(f"{path.stem}.coefficients{path.suffix}")
-    with atomic_write(beside.absolute(), replace=replace) as made:
-        write_csv_coefficients([exported], made)
-    return [path, beside]
+    return [path, *_write_beside(name, [exported], path, replace=replace)]
+
+
+def _write_together(
+    name: str, exported: Sequence[ExportedRun], path: Path, *, replace: bool = False
+) -> list[Path]:
+    """Write several runs to one file as `write_exported_run` writes one."""
+    with atomic_write(path.absolute(), replace=replace) as made:
+        TOGETHER[name](exported, made)
+    return [path, *_write_beside(name, exported, path, replace=replace)]
+
+
+def _write_beside(name: str, exported: Sequence[ExportedRun], path: Path, *, replace: bool) -> Iterator[Path]:
+    """Coefficients, where there are any, beside samples in CSV."""
+    if name == "csv" and any(one.analysis is not None for one in exported):
+        beside = path.with_name(f"{path.stem}.coefficients{path.suffix}")
+        with atomic_write(beside.absolute(), replace=replace) as made:
+            write_csv_coefficients(exported, made)
+        yield beside
 
 
 Progress = Callable[[int, str], None]
@@ -97,8 +111,9 @@ def export_runs(
 ) -> list[ExportOutcome]:
     """Export runs, in the order given; one that fails is reported and does not stop the rest.
 
-    `output` is the file to write, or a folder for the samples of several runs. `progress` is called with the
-    number done and the name of the next run. Raises RunError where nothing can be written at all.
+    `output` is the file to write, or a folder with a file a run. Several runs go into one file where it has
+    the ending of its format. `progress` is called with the number done and the name of the next run. Raises
+    RunError where nothing can be written at all.
     """
     if request.content == "coefficients" and request.writer.write_coefficients is None:
         raise UnsuitableRunError(
@@ -108,16 +123,17 @@ def export_runs(
         raise UnsuitableRunError(
             "{format} holds coefficients, not samples. Choose csv, json or parquet", format=request.format
         )
-    targets = [output] * len(paths) if request.is_one_file else _targets(paths, output, request)
+    gathers = request.is_one_file or _are_together(paths, output, request)
+    targets = [output] * len(paths) if gathers else _targets(paths, output, request)
     gathered: list[ExportedRun] = []
-    outcomes = []
+    outcomes: list[ExportOutcome] = []
     with Validator.start() as validator:
         for done, (path, target) in enumerate(zip(paths, targets, strict=True)):
             progress(done, path.name)
             try:
                 exported, note = _load(path, request, validator)
                 files = [output.absolute()]
-                if request.is_one_file:
+                if gathers:
                     gathered.append(exported)
                 else:
                     files = write_exported_run(request.format, exported, target, replace=request.replace)
@@ -126,10 +142,24 @@ def export_runs(
                 outcomes.append(ExportOutcome(str(path.absolute()), names, note=note, is_simulated=simulated))
             except (RunError, AnalysisError) as error:
                 outcomes.append(ExportOutcome(str(path.absolute()), error=message_of(error)))
+    if gathered and not request.is_one_file:
+        written = _write_together(request.format, gathered, output.absolute(), replace=request.replace)
+        files_of_all = list(map(str, written))
+        return [msgspec.structs.replace(one, files=files_of_all) if one.files else one for one in outcomes]
     if gathered and request.writer.write_coefficients is not None:
         with atomic_write(output.absolute(), replace=request.replace) as made:
             request.writer.write_coefficients(gathered, made)
     return outcomes
+
+
+def _are_together(paths: Sequence[Path], output: Path, request: ExportRequest) -> bool:
+    """Whether samples of several runs go into one file. Raises UnsuitableRunError where that holds one."""
+    if len(paths) == 1 or output.is_dir() or output.suffix.lower() != request.writer.suffix:
+        return False
+    if request.format not in TOGETHER:
+        template = N_("{format} holds one run a file, but {count} runs are given. Give a folder as {option}")
+        raise UnsuitableRunError(template, format=request.format, count=len(paths), option=option("-o"))
+    return True
 
 
 def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> list[Path]:
