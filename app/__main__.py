@@ -3,10 +3,24 @@
 import os
 import sys
 
+from app.interrupts import EXIT_CODE, LINE, follow_interrupts, ignore_interrupts
+
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
 def main() -> None:
+    """Run what the arguments ask for, and end with 130 and one line if it is interrupted."""
+    follow_interrupts()
+    try:
+        _run()
+    except KeyboardInterrupt:
+        sys.stderr.write(LINE)
+        sys.exit(EXIT_CODE)
+    finally:
+        ignore_interrupts()
+
+
+def _run() -> None:
     """Run what the arguments ask for. Nothing heavy is imported before it is known to be needed."""
     arguments = sys.argv[1:]
     for name in _THREADS:  # small matrices: more threads only wait for each other

@@ -99,14 +99,31 @@ def spawn(
     flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console window otherwise
     if is_background:
         flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)
-    return subprocess.Popen(
-        child_command(module, *arguments),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL if discard_stderr else None,
-        env=os.environ | _ONE_THREAD if is_background else None,
-        creationflags=flags,
-    )
+    with hold_interrupts():
+        return subprocess.Popen(
+            child_command(module, *arguments),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL if discard_stderr else None,
+            env=os.environ | _ONE_THREAD if is_background else None,
+            creationflags=flags,
+        )
+
+
+@contextlib.contextmanager
+def hold_interrupts() -> Iterator[None]:
+    """Block Ctrl-C here and in processes that are started meanwhile, where the system can.
+
+    It would end a process that is starting with a traceback.
+    """
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 class ChildProcess(Generic[Command, Event]):

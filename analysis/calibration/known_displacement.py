@@ -11,6 +11,7 @@ from messages.i18n import N_
 
 COVERAGE: Final = 2.0  # tolerance over the combined standard uncertainty: about 95 % (JCGM 100, 6.3)
 _BLUNT: Final = 0.05  # a tolerance above this share passes errors of a gain that matter for f_d
+_UNMOVED: Final = 0.02  # share of the displacement below which a gauge was not moved: no gain is so wrong
 _BOTH_ENDS: Final = math.sqrt(2.0)
 _SQRT12: Final = math.sqrt(12.0)
 
@@ -89,7 +90,7 @@ def check_displacement(
     """Compare the difference of two readings with a known displacement.
 
     Zero and rest position cancel: only the gain is checked. Raises CalibrationError for readings that are not
-    finite, or of too few samples.
+    finite, of too few samples, or the same.
     """
     for reading in (rest, moved):
         if not math.isfinite(reading.displacement_m) or reading.samples < 2:
@@ -99,9 +100,16 @@ def check_displacement(
                 displacement_m=reading.displacement_m,
                 samples=reading.samples,
             )
+    measured_m = moved.displacement_m - rest.displacement_m
+    if abs(measured_m) < _UNMOVED * abs(reference.displacement_m):
+        raise CalibrationError(
+            "the gauge shows {measured_mm:+.4f} mm of {known_mm:+g} mm: it was not moved, or it does not"
+            " read. Nothing is kept. Move it and check it again",
+            measured_mm=measured_m * 1e3,
+            known_mm=reference.displacement_m * 1e3,
+        )
     budget = _budget(rest, moved, reference, claim)
     stated = [line.standard_uncertainty for line in budget if not math.isnan(line.standard_uncertainty)]
-    measured_m = moved.displacement_m - rest.displacement_m
     combined_m = math.hypot(*stated)
     return DisplacementCheck(
         reference.displacement_m,

@@ -1,5 +1,6 @@
 """The command line: words in, words and JSON out."""
 
+import codecs
 import io
 import logging
 import os
@@ -7,6 +8,7 @@ import sys
 
 from app.cli.commands import app
 from app.cli.errors import error_text, is_expected
+from app.interrupts import was_interrupted
 from app.log import start_log
 
 _log = logging.getLogger(__name__)
@@ -23,7 +25,14 @@ def run() -> None:
     start_log("command")
     try:
         app()
+    except SystemExit as ended:
+        of_typer = getattr(ended.__context__, "__cause__", None)
+        if was_interrupted() or isinstance(of_typer, KeyboardInterrupt):
+            raise KeyboardInterrupt from None
+        raise
     except Exception as error:
+        if was_interrupted():
+            raise KeyboardInterrupt from None
         _log.log(logging.INFO if is_expected(error) else logging.ERROR, "failed", exc_info=True)
         if os.environ.get("SLIPSTAND_DEBUG"):
             raise
@@ -38,5 +47,24 @@ def _use_utf8(stream: object) -> None:
     """
     if isinstance(stream, io.TextIOWrapper):
         is_chosen = stream.isatty() or bool(os.environ.get("PYTHONIOENCODING"))
-        # Names of files may be no text: `\\udcff` is, and is JSON too.
-        stream.reconfigure(encoding=None if is_chosen else "utf-8", errors="backslashreplace")
+        stream.reconfigure(encoding=None if is_chosen else "utf-8", errors=_SPELLED)
+
+
+_SPELLED = "slipstand-spelled"  # how `codecs` calls `_spell`
+_SPELLINGS = {
+    "±": "+-", "µ": "u", "²": "^2", "³": "^3", "×": "x", "·": "*", "°": "deg ", "–": "-", "−": "-",
+    "≥": ">=", "≤": "<=", "→": "->", "…": "...", "\u00a0": " ", "\u202f": " ",
+}  # fmt: skip
+"""Of signs that a terminal may lack."""
+
+
+def _spell(error: UnicodeError) -> tuple[str, int]:
+    """Spell what an encoding lacks: signs, and names of files that are no text, which JSON spells alike."""
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    missing = error.object[error.start : error.end]
+    spelled = (_SPELLINGS.get(sign) or sign.encode("ascii", "backslashreplace").decode() for sign in missing)
+    return "".join(spelled), error.end
+
+
+codecs.register_error(_SPELLED, _spell)

@@ -32,6 +32,7 @@ from app.simulated_stand.synthetic_campaign import (
     CampaignOptions,
     Comparison,
     compare,
+    duration,
     plan_tests,
     record_tests,
     series_truths,
@@ -53,7 +54,12 @@ def _record_test(options: DemoOptions) -> None:
     series, friction = options.series or "1FFM0", options.friction
     effects = parse_effects(key_values(options.effects, "--effect"))
     stand_options = checked(
-        SimulatedStandOptions, series=series, friction=friction, effects=effects, decay_s=_RECORD_S + 2.0
+        SimulatedStandOptions,
+        DemoOptions,
+        series=series,
+        friction=friction,
+        effects=effects,
+        decay_s=_RECORD_S + 2.0,
     )
     with SimulatedStand.start(stand_options) as stand:
         port = PortSettings(
@@ -72,7 +78,8 @@ def _record_test(options: DemoOptions) -> None:
     if ended.ended == EndReason.INTERRUPTED:
         raise typer.Exit(130)
     if ended.ended != EndReason.DURATION:
-        raise CommandError(f"the demo's run ended: {ended.ended}. {ended.message} (kept in {ended.path})")
+        kept = f" (kept in {ended.path})" if ended.path else ""
+        raise CommandError(f"the demo's run ended: {ended.ended}. {ended.message}{kept}")
     path = Path(ended.path)
     with out.progress_bar("identifying", total=1.0) as update:
         analysis = analyze_run(path, AnalysisRequest(), save=True, progress=update)
@@ -115,6 +122,7 @@ def _record_campaign(options: DemoOptions) -> None:
     codes = tuple(code.strip() for code in (options.series or "").split(",") if code.strip())
     campaign_options = checked(
         CampaignOptions,
+        DemoOptions,
         series=codes,
         repeats=options.repeats,
         friction_scatter=options.scatter,
@@ -124,7 +132,8 @@ def _record_campaign(options: DemoOptions) -> None:
     executor = executor_options(options.jobs)
     stand, gauges, now = load_stand(), load_gauges(), datetime.datetime.now().astimezone()
     folder = _new_folder(options.directory, now)
-    tests = plan_tests(campaign_options, stand, gauges, folder, now)
+    begins = now - duration(campaign_options)
+    tests = plan_tests(campaign_options, stand, gauges, folder, begins)
     series = len({test.series for test in tests})
     out.print_status(f"{len(tests)} tests of {series} series are recorded in {folder}")
     with out.progress_bar("recording", total=1.0) as update:

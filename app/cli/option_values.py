@@ -7,19 +7,27 @@ from typing import Any, TypeVar
 from app.acquisition.messages import PortSettings
 from app.cli import output as out
 from app.cli.errors import CommandError
+from app.cli.options import option_names
 from app.cli.shared_options import ConditionOptions, DeviceOptions, JobOptions, LinkOptions, MassOptions
 from app.runs.batch.executors import ExecutorOptions
 from app.runs.metadata import Conditions
 from app.runs.paths import recordings_directory
+from app.simulated_stand.options import OutOfRangeError
 from config.files import load_stand, settings_file
 
 Options = TypeVar("Options")
 
 
-def checked(kind: Callable[..., Options], /, **values: Any) -> Options:
-    """Build options that check their values. Raises CommandError for a value out of range."""
+def checked(kind: Callable[..., Options], declared: type[Any] | None = None, /, **values: Any) -> Options:
+    """Build options that check their values. Raises CommandError for a value out of range.
+
+    `declared` are the options of the command line with the same fields: an error calls one by its name there.
+    """
     try:
         return kind(**values)
+    except OutOfRangeError as error:
+        name = option_names(declared).get(error.field) if declared else None
+        raise CommandError(f"{name} {error.fault}" if name else str(error)) from None
     except ValueError as error:
         raise CommandError(str(error)) from None
 

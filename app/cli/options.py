@@ -66,6 +66,16 @@ def number(
     return option(name, description, default, parser=parse, metavar="INTEGER" if integer else "FLOAT")
 
 
+def option_names(options: type[Any]) -> dict[str, str]:
+    """The longest name of each option, by its field: `rest_s` is `--rest`."""
+    declared = ((field.name, field.metadata.get("typer")) for field in dataclasses.fields(options))
+    return {
+        field: max(declaration.param_decls, key=len)
+        for field, declaration in declared
+        if isinstance(declaration, typer.models.OptionInfo) and declaration.param_decls
+    }
+
+
 def _field(declaration: Any, default: Any) -> Any:
     return dataclasses.field(default=default, metadata={"typer": declaration})
 

@@ -48,7 +48,8 @@ class ProgressPrinter:
     def on_event(self, event: Event) -> None:
         match event:
             case messages.Connected(device, firmware, rate_hz):
-                out.print_status(f"connected: {device} {firmware}, {rate_hz:g} Hz{self._verified}")
+                named = f"{device} {firmware}".strip()
+                out.print_status(f"connected: {named}, {rate_hz:g} Hz{self._verified}")
             case messages.Reconnecting() | messages.Reconnected():
                 out.print_status(str(event.message))
             case StateChanged():

@@ -49,4 +49,4 @@ def _stand_options(options: StandOptions, settings: dict[str, str]) -> Simulated
         values["gauges_file"] = str(options.gauges_file.expanduser().resolve())
     values["effects"] = parse_effects(key_values(options.effects, "--effect"))
     values["disturbances"] = tuple(options.disturbances or ())
-    return checked(SimulatedStandOptions, **values, device=settings)
+    return checked(SimulatedStandOptions, StandOptions, **values, device=settings)

@@ -1,10 +1,13 @@
 """Free space of a disk, durable and atomic writes, and the errors of storage."""
 
+import contextlib
 import errno
 import os
+import re
 import shutil
 import sys
 import tempfile
+import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -137,6 +140,27 @@ def sync_folder(folder: Path) -> None:
     except OSError as error:
         if error.errno not in _CANNOT_SYNC:
             raise
+
+
+_LEFT_S = 600.0  # no copy of a run takes so long; younger ones may still be written
+_TEMPORARY = re.compile(r"\..+\.(\d+\.tmp|[0-9a-f]{8}\.\w+)")
+"""Names of `temporary_copy` and of `atomic_write`."""
+
+
+def temporary_copy(path: Path) -> Path:
+    """Path beside a file for a copy of it that replaces it."""
+    return path.with_name(f".{path.name}.{os.getpid()}.tmp")
+
+
+def leftover_files(folder: Path) -> list[Path]:
+    """Temporary files in a folder and below that a program left which was killed while it wrote them."""
+    found = []
+    for place, _, names in os.walk(folder):
+        for path in (Path(place) / name for name in names if _TEMPORARY.fullmatch(name)):
+            with contextlib.suppress(OSError):  # gone meanwhile
+                if time.time() - path.stat().st_mtime > _LEFT_S:
+                    found.append(path)
+    return sorted(found)
 
 
 @contextmanager

@@ -5,6 +5,7 @@ import traceback
 from pathlib import Path
 from typing import cast
 
+from app.interrupts import was_interrupted
 from config.durable_files import file_in_use, is_in_use
 from messages.i18n import N_
 from messages.message import Message, MessageError, message
@@ -130,8 +131,11 @@ def one_line(error: BaseException) -> str:
 def internal_error(error: Exception) -> Message:
     """Message for a fault of the program itself; with SLIPSTAND_DEBUG its traceback goes to stderr.
 
-    Worker processes write to the stderr of the process that started them.
+    Worker processes write to the stderr of the process that started them. Raises KeyboardInterrupt where the
+    error came of one, as compiled code passes it on.
     """
+    if was_interrupted():
+        raise KeyboardInterrupt from error
     if os.environ.get("SLIPSTAND_DEBUG"):
         traceback.print_exception(error)
     template = N_(

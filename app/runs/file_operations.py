@@ -198,6 +198,8 @@ def _check_trashed(path: Path) -> None:
 
 
 def _check_movable(path: Path) -> None:
+    if path.is_dir():
+        raise errors.NotARunError("{path} is a folder. Give a run file in it", path=path)
     if not path.is_file():
         raise errors.no_such_run(path)
     if is_being_recorded(path):

@@ -1,7 +1,6 @@
 """Change a closed run without opening it for writing: copy, change the copy, verify it, replace."""
 
 import datetime
-import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +9,7 @@ import h5py
 
 from app.runs import schema
 from app.runs.columns import check_column, checksum, is_finished, sample_paths
-from app.runs.disk import check_free_space, storage_error, sync_file, sync_folder
+from app.runs.disk import check_free_space, storage_error, sync_file, sync_folder, temporary_copy
 from app.runs.errors import UnsuitableRunError, WriteError, being_recorded, no_such_run
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
 from app.runs.validation import validate_file
@@ -28,7 +27,7 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     path = path.resolve()  # of a link the file is replaced, not the link
     if is_being_recorded(path):
         raise being_recorded(path)
-    copy = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    copy = temporary_copy(path)
     try:
         with editing_lock(path):
             _make_copy(path, copy, change)

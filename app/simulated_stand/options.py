@@ -175,7 +175,16 @@ class SimulatedStandOptions(msgspec.Struct, frozen=True, forbid_unknown_fields=T
         return msgspec.convert(self, Timetable, from_attributes=True)
 
 
+class OutOfRangeError(ValueError):
+    """A value out of its range; `field` is the option that has it."""
+
+    def __init__(self, field: str, fault: str) -> None:
+        super().__init__(f"{field} = {fault}")
+        self.field = field
+        self.fault = fault
+
+
 def check_within(name: str, value: float | None, low: float, high: float) -> None:
-    """Raise ValueError unless a value is in its range."""
+    """Raise OutOfRangeError unless a value is in its range."""
     if value is not None and not (math.isfinite(value) and low <= value <= high):
-        raise ValueError(f"{name} = {value:g} is out of range: give {low:g} to {high:g}")
+        raise OutOfRangeError(name, f"{value:g} is out of range: give {low:g} to {high:g}")

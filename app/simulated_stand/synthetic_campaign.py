@@ -109,6 +109,11 @@ def draw_errors(stand: Stand, gauges: Gauges, seed: int) -> SystematicErrors:
     )
 
 
+def duration(options: CampaignOptions) -> datetime.timedelta:
+    """How long the tests take together, one after another: they are dated before they are made."""
+    return len(options.series or published_table()) * options.repeats * _BETWEEN_TESTS
+
+
 def plan_tests(
     options: CampaignOptions, stand: Stand, gauges: Gauges, folder: Path, first: datetime.datetime
 ) -> list[SyntheticTest]:

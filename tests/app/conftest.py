@@ -1,6 +1,7 @@
 """Puts the fakes of this folder (`stage.py`) within reach of the tests below it."""
 
 import datetime
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -32,6 +33,14 @@ def keep_validator() -> Iterator[None]:
         for module in (reader, listing, file_operations, exporting):
             patch.setattr(module, "Validator", KeptValidator)
         yield
+
+
+@pytest.fixture(autouse=True)
+def keep_interrupts() -> Iterator[None]:
+    """A command leaves Ctrl-C ignored, since its process ends then; that of the tests goes on."""
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(autouse=True)

@@ -8,7 +8,7 @@ from typing import Literal
 
 from app.cli.doctor import Finding, fail, ok, warn
 from app.runs.creation import check_folder
-from app.runs.disk import free_bytes
+from app.runs.disk import free_bytes, leftover_files
 from app.runs.errors import RunError
 from app.runs.journal import unfinished_journals
 from app.runs.paths import journal_fallback_folders, recordings_directory
@@ -20,6 +20,7 @@ _SYNCHRONISED = (
     "OneDrive", "Dropbox", "Google Drive", "Nextcloud", "iCloud", "com~apple~CloudDocs",
 )  # fmt: skip
 """Beginnings of the names of folders that programs copy to other computers."""
+_NAMED = 5
 _LITTLE_BYTES, _NONE_BYTES = 2_000_000_000, 100_000_000
 
 
@@ -34,6 +35,7 @@ def check_folders() -> Iterator[Finding]:
     recordings = recordings_directory(settings)
     yield from _recordings(recordings, "settings.toml" if settings.recordings else "")
     yield check_unfinished_runs([recordings, *journal_fallback_folders()])
+    yield check_leftovers(recordings)
 
 
 def _why(variable: str, chosen_in: str = "") -> str:
@@ -108,6 +110,19 @@ def check_unfinished_runs(places: list[Path]) -> Finding:
         return ok("unfinished runs", "none")
     first = next(place for place, number in left.items() if number)
     return warn("unfinished runs", ", ".join(told), f"Rebuild them: slipstand recover {first}")
+
+
+def check_leftovers(folder: Path) -> Finding:
+    """Say which temporary files a killed program has left among the runs."""
+    left = leftover_files(folder)
+    if not left:
+        return ok("leftovers", "none")
+    size = sum(path.stat().st_size for path in left)
+    names = ", ".join(str(path) for path in left[:_NAMED]) + (" and others" if left[_NAMED:] else "")
+    said = (
+        f"{len(left)} temporary files, {size / 1e6:.1f} MB, of programs that were killed; runs are unharmed"
+    )
+    return warn("leftovers", said, f"Delete them: {names}")
 
 
 _GAUGES: dict[Literal["table", "relative"], str] = {"table": "gauge 1", "relative": "gauge 2"}

@@ -12,7 +12,7 @@ from app.runs.campaign.collect import CollectedRuns, CollectOptions, RunCollecti
 from app.runs.edits import edit_run, undo_edit
 from app.runs.listing import find_run_files
 from app.runs.metadata_io import Change
-from app.simulated_stand.synthetic_campaign import CampaignOptions, plan_tests, record_tests
+from app.simulated_stand.synthetic_campaign import CampaignOptions, duration, plan_tests, record_tests
 from config.files import load_gauges, load_stand
 from messages.i18n import N_
 
@@ -62,7 +62,8 @@ def simulate(folder: str, report: ReportProgress) -> str:
     """Simulate and record all tests of a campaign into a new folder below `folder`; return its path."""
     now = datetime.datetime.now().astimezone()
     place = Path(folder) / f"synthetic-campaign-{now:%Y%m%dT%H%M%S}"
-    tests = plan_tests(CampaignOptions(repeats=TARGET_REPEATS), load_stand(), load_gauges(), place, now)
+    options = CampaignOptions(repeats=TARGET_REPEATS)
+    tests = plan_tests(options, load_stand(), load_gauges(), place, now - duration(options))
     record_tests(tests, ExecutorOptions(), batch_progress(report, _RECORDING, [test.path for test in tests]))
     return str(place)
 

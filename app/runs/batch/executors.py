@@ -1,11 +1,9 @@
 """Executors for work on many runs - here, in processes, on a Dask cluster - and an ordered map over them."""
 
-import contextlib
 import importlib
 import logging
 import multiprocessing
 import os
-import signal
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -13,11 +11,13 @@ from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
+from multiprocessing import resource_tracker
 from multiprocessing.synchronize import Lock
 from typing import Any, ClassVar, Generic, TypeVar
 
 import msgspec
 
+from app.child_process import hold_interrupts
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 from app.runs.errors import ClusterError, ExtraMissingError, one_line
 from app.version import __version__
@@ -155,7 +155,9 @@ class ProcessExecutor(Executor):
 
     def submit(self, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
         """Hand over one item. Raises BrokenProcessPool after a worker died, until `renew`."""
-        with _interrupts_held():  # Ctrl-C must not kill a process that is starting, with a traceback
+        if sys.platform != "win32":
+            resource_tracker.ensure_running()  # its start would let interrupts through
+        with hold_interrupts():
             return self._started().submit(work, item)
 
     def renew(self) -> None:
@@ -294,19 +296,6 @@ def _answer(item: Item, future: "Future[Answer]") -> Answer | FailedItem[Item]:
         raise error
     kind, text = type(error).__name__, one_line(error)[:200]
     return FailedItem(item, message("its worker failed ({kind}: {text})", kind=kind, text=text))
-
-
-@contextlib.contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Block Ctrl-C here and in processes that are started meanwhile, where the system can."""
-    if sys.platform == "win32":
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(lifeline: PipeEnd, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
