@@ -125,7 +125,7 @@ def _record_campaign(options: DemoOptions) -> None:
         DemoOptions,
         series=codes,
         repeats=options.repeats,
-        friction_scatter=options.scatter,
+        friction_scatter=options.friction_scatter,
         seed=options.seed,
         effects=parse_effects(key_values(options.effects, "--effect")),
     )

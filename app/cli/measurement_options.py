@@ -45,7 +45,7 @@ class DemoOptions:
     campaign: bool = flag("--campaign", "All series of Table 1, several tests each, not in real time.")
     effects: list[str] | None = shared.effects()
     repeats: int = option("--repeats", "With --campaign: tests of each series.", 3)
-    scatter: float = option(
+    friction_scatter: float = option(
         "--scatter", "With --campaign: standard deviation of f_d from run to run, as a share.", 0.0
     )
     seed: int = option("--seed", "With --campaign: seed of the random numbers.", 1)

@@ -20,7 +20,7 @@ REQUIRED: Final[Any] = dataclasses.MISSING  # default of an option that must be 
 
 def option(names: str, description: str, default: Any = None, **settings: Any) -> Any:
     """Declare an option of these names, "-o --output", with further settings of `typer.Option`."""
-    return _field(typer.Option(*names.split(), help=description, **settings), default)
+    return _field(typer.Option(*names.split(), help=description, **settings), default, names)
 
 
 def flag(name: str, description: str) -> Any:
@@ -67,17 +67,13 @@ def number(
 
 
 def option_names(options: type[Any]) -> dict[str, str]:
-    """The longest name of each option, by its field: `rest_s` is `--rest`."""
-    declared = ((field.name, field.metadata.get("typer")) for field in dataclasses.fields(options))
-    return {
-        field: max(declaration.param_decls, key=len)
-        for field, declaration in declared
-        if isinstance(declaration, typer.models.OptionInfo) and declaration.param_decls
-    }
+    """The long name of each option, by its field: `rest_s` is `--rest`."""
+    declared = ((field.name, field.metadata.get("names")) for field in dataclasses.fields(options))
+    return {field: names.split()[-1] for field, names in declared if names}
 
 
-def _field(declaration: Any, default: Any) -> Any:
-    return dataclasses.field(default=default, metadata={"typer": declaration})
+def _field(declaration: Any, default: Any, names: str = "") -> Any:
+    return dataclasses.field(default=default, metadata={"typer": declaration, "names": names})
 
 
 def command_function(options: type[Any], run: Callable[[Any], None]) -> Callable[..., None]:

@@ -119,9 +119,8 @@ def check_leftovers(folder: Path) -> Finding:
         return ok("leftovers", "none")
     size = sum(path.stat().st_size for path in left)
     names = ", ".join(str(path) for path in left[:_NAMED]) + (" and others" if left[_NAMED:] else "")
-    said = (
-        f"{len(left)} temporary files, {size / 1e6:.1f} MB, of programs that were killed; runs are unharmed"
-    )
+    count = "1 temporary file" if len(left) == 1 else f"{len(left)} temporary files"
+    said = f"{count} of killed programs, {size / 1e6:.1f} MB; the runs are unharmed"
     return warn("leftovers", said, f"Delete them: {names}")
 
 

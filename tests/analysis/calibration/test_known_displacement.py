@@ -103,6 +103,12 @@ def test_a_blunt_check_and_a_turned_gauge_are_said() -> None:
     assert not turned.passed
 
 
+@pytest.mark.parametrize("measured_m", [0.0, 2e-6, -5e-5])
+def test_a_gauge_that_was_not_moved_is_no_failed_check(measured_m: float) -> None:
+    with pytest.raises(CalibrationError, match=r"of \+10 mm: it was not moved, or it does not read"):
+        checked(measured_m)
+
+
 @pytest.mark.parametrize("displacement_m", [0.0, math.nan, math.inf])
 def test_a_displacement_that_checks_nothing_is_refused(displacement_m: float) -> None:
     with pytest.raises(CalibrationError, match="checks nothing"):

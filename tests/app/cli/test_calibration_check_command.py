@@ -126,3 +126,12 @@ def test_a_broken_history_is_told_before_anything_is_opened(slipstand: Any, gaug
         "calibrate", "check", "--gauge", "table", "--port", "loop://", "--protocol", "csv", "--shunt", 1
     )
     assert_one_error_line(outcome, "gauge-checks.toml: is not valid TOML")
+
+
+@pytest.mark.parametrize("bench", [("3", 0.0)], indirect=True)
+def test_a_gauge_that_was_not_moved_keeps_no_check(slipstand: Any, bench: Bench, gauges_file: Path) -> None:
+    outcome = slipstand(*arguments(bench, gauges_file, "--displacement", 6))
+    assert outcome.code == 1
+    assert "error: the gauge shows" in outcome.err
+    assert "mm of +6 mm: it was not moved, or it does not read. Nothing is kept" in outcome.err
+    assert not checks_path().exists()

@@ -2,6 +2,7 @@
 
 import datetime
 import json
+import os
 import shlex
 import zipfile
 from pathlib import Path
@@ -317,3 +318,19 @@ def test_a_bundle_holds_what_a_bug_report_needs_and_says_so(
         assert f"{name}: " in readme
         assert f"{name}: " in outcome.err
     assert slipstand("doctor", "--bundle", target).code == 1, "nothing is overwritten without --force"
+
+
+def test_what_killed_programs_left_among_the_runs_is_said(slipstand: Any, own_folders: Path) -> None:
+    runs = own_folders / "runs"
+    (runs / "below").mkdir(parents=True)
+    left = [runs / ".run.h5.4711.tmp", runs / "below" / ".other.0123abcd.h5"]
+    for path in (*left, runs / ".young.h5.4712.tmp", runs / ".hidden.h5"):
+        path.write_bytes(b"copy")
+    for path in (*left, runs / ".hidden.h5"):
+        os.utime(path, (0, 0))
+    outcome = slipstand("doctor", "--json")
+    assert outcome.code == 0
+    check = found(outcome)["leftovers"]
+    assert check["state"] == "warn"
+    assert check["message"].startswith("2 temporary files of killed programs, 0.0 MB")
+    assert check["remedy"] == f"Delete them: {left[0]}, {left[1]}"

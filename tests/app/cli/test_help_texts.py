@@ -1,5 +1,6 @@
 """`--help` of every command: whole sentences in the lists, and a unit for every number."""
 
+import os
 import re
 import subprocess
 import sys
@@ -7,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cli_kit import assert_one_error_line
 
 from app.cli.result_options import FIGURE_FORMATS, TABLE_FORMATS
 from app.reports.figures import style
@@ -123,3 +125,28 @@ def test_the_reference_names_only_options_that_there_are(
     known = {"--help"}.union(*(options_of(slipstand(*name.split(), "--help").out) for name in commands))
 
     assert set(re.findall(r"`(--[a-z][a-z0-9-]*)", text)) <= known
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("device", "simulate", "--rest", 0), "--rest 0 is out of range: give 0.05 to 3600"),
+        (("device", "simulate", "--lag", 9), "--lag 9 is out of range: give -1 to 1"),
+        (("demo", "--campaign", "--repeats", 0), "--repeats 0 is out of range: give 1 to 1000"),
+        (("demo", "--campaign", "--scatter", 1), "--scatter 1 is out of range: give 0 to 0.3"),
+    ],
+)
+def test_a_value_out_of_range_is_named_by_its_option(
+    slipstand: Any, arguments: tuple[object, ...], said: str
+) -> None:
+    assert_one_error_line(slipstand(*arguments), said)
+
+
+def test_a_terminal_without_the_sign_is_shown_its_spelling() -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    code = "import sys; from app.cli import _use_utf8; _use_utf8(sys.stdout);"
+    code += "print('0.1 \\xb1 0.2 \\xb5m\\xb2 \\udcff \\u0431')"
+    shown = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment
+    )
+    assert shown.stdout == "0.1 +- 0.2 um^2 \\udcff \\u0431\n"

@@ -96,3 +96,8 @@ def test_a_file_name_that_is_no_text_is_listed(slipstand: Any, run: Path) -> Non
 
 def test_the_trash_of_a_folder_that_is_not_there_is_one_line(slipstand: Any, tmp_path: Path) -> None:
     assert_one_error_line(slipstand("trash", "--list", tmp_path / "absent"), "no such folder")
+
+
+def test_a_folder_is_no_run_for_the_trash(slipstand: Any, run: Path) -> None:
+    assert_one_error_line(slipstand("trash", run.parent), "is a folder. Give a run file in it")
+    assert run.exists()

@@ -11,6 +11,7 @@ from app.runs.reader import load_counts, open_run
 from app.simulated_stand.synthetic_campaign import (
     CampaignOptions,
     draw_errors,
+    duration,
     plan_tests,
     series_parameters,
     write_test,
@@ -103,3 +104,10 @@ def test_a_series_that_is_none_is_refused():
         planned(CampaignOptions(series=("9XX",)))
     with pytest.raises(ValueError, match="repeats = 0"):
         CampaignOptions(repeats=0)
+
+
+def test_the_tests_of_a_campaign_are_dated_before_they_are_made() -> None:
+    options = CampaignOptions(series=("1FFM0", "1FFM1"), repeats=3)
+    tests = plan_tests(options, load_stand(), load_gauges(), Path("runs"), START - duration(options))
+    assert len(tests) == 6
+    assert START - datetime.timedelta(minutes=3) < tests[-1].start_time < START
