@@ -6,13 +6,13 @@ from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QShowEvent
-from PySide6.QtWidgets import QComboBox, QFrame, QLabel, QLineEdit, QPushButton, QWidget
+from PySide6.QtWidgets import QApplication, QComboBox, QFrame, QLabel, QLineEdit, QPushButton, QWidget
 
 from app.presenters.base import Chip, Tone
 from app.presenters.navigator import ConnectForm
 from app.presenters.recent import RUNS_MAX
 from app.presenters.start_screen import StartPresenter, StartState
-from app.qt.theme import TextRole
+from app.qt.theme import TextRole, set_property
 from app.qt.widgets.inputs import ComboBox, make_button, show_texts
 from app.qt.widgets.layouts import (
     STRETCH,
@@ -23,7 +23,7 @@ from app.qt.widgets.layouts import (
     make_row,
     make_scroll_area,
 )
-from app.qt.widgets.shortcuts import bind_button
+from app.qt.widgets.shortcuts import ENTER_KEYS, add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, padded, set_text_or_hide, show_chip
 from drivers.driver import UNVERIFIED
 from messages.i18n import N_, gettext
@@ -70,6 +70,7 @@ class StartScreen(QWidget):
         ):
             bind_button(button, keys, words, self)
         self._open.setToolTip(gettext("Open a recording") + " (Ctrl+O)")
+        add_shortcut(self, ENTER_KEYS, "", self._press_primary)
 
     def show_state(self, state: StartState) -> None:
         if self._series.count() != len(state.all_series):
@@ -88,10 +89,22 @@ class StartScreen(QWidget):
         self._runs.show_runs(state.runs)
         for button in (self._try, self._last, self._connect):
             button.setEnabled(not state.busy)
+        is_first = not (state.connected or state.last_device)
+        set_property(self._try, "primary", "true" if is_first else "false")
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         super().showEvent(event)
         self._presenter.refresh()
+
+    def _press_primary(self) -> None:
+        """Press what Enter means: the button of the fields in use, else what connects as at the last start."""
+        state, focused = self._presenter.state, QApplication.focusWidget()
+        if focused is not None and self._form.isAncestorOf(focused):
+            self._connect.click()
+        elif focused is self._series or not (state.connected or state.last_device):
+            self._try.click()
+        elif not state.connected:
+            self._last.click()
 
     def _lay_out(self) -> None:
         cards = make_row(

@@ -19,7 +19,7 @@ from app.presenters.record.state import (
 from app.qt.theme import TextRole, font, set_property
 from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ComboBox, ShortcutSafeEdit, make_button, show_texts
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
-from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
+from app.qt.widgets.shortcuts import ENTER_KEYS, add_shortcut, bind_button, set_button_hint
 from app.qt.widgets.text import label
 from messages.i18n import N_, gettext, ngettext
 
@@ -126,8 +126,16 @@ class RunBar(QFrame):
         text, key, description = _BUTTONS[action]
         button = make_button(f"{gettext(text)}   {key}", lambda: self._dispatch(action), large=True)
         button.setMinimumWidth(108)
-        bind_button(button, ("Return", "Enter") if key == "Enter" else key, gettext(description), self)
+        if key == "Enter":
+            bind_button(button, ENTER_KEYS, gettext(description), self, act=self._press_primary)
+        else:
+            bind_button(button, key, gettext(description), self)
         return button
+
+    def _press_primary(self) -> None:
+        """Press Keep or Next, or Arm where that is the usual next action."""
+        following, arm = self._buttons[Action.NEXT], self._buttons[Action.ARM]
+        (arm if arm.property("primary") == "true" else following).click()
 
     def _name(self, action: Action, name: tuple[str, str] | None) -> None:
         """Give a button another label and description for the present state; None its usual ones."""

@@ -12,6 +12,7 @@ from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_a
 from app.qt.widgets.text import label
 from messages.i18n import gettext
 
+ENTER_KEYS = ("Return", "Enter")
 _DESCRIBED = "described_keys"
 _SHOWN = "shown_key"
 
@@ -36,14 +37,21 @@ def add_shortcut(
         if focused:
             shortcut.setContext(Qt.ShortcutContext.WidgetShortcut)
         shortcut.setWhatsThis(words if number == 0 else "")
+        shortcut.setAutoRepeat(key not in ENTER_KEYS)  # one that is held down would answer the next question
         shortcut.activated.connect(act)
 
 
 def bind_button(
-    button: QAbstractButton, keys: str | Sequence[str], words: str, owner: QWidget, *, focused: bool = False
+    button: QAbstractButton,
+    keys: str | Sequence[str],
+    words: str,
+    owner: QWidget,
+    *,
+    focused: bool = False,
+    act: Callable[[], object] | None = None,
 ) -> None:
-    """Let keys press a button; its tool tip has the description and the first key."""
-    add_shortcut(owner, keys, words, button.click, focused=focused)
+    """Let keys press a button, or call `act`; its tool tip has the description and the first key."""
+    add_shortcut(owner, keys, words, act or button.click, focused=focused)
     button.setProperty(_SHOWN, _native(keys if isinstance(keys, str) else keys[0]))
     set_button_hint(button, words)
 
