@@ -89,8 +89,9 @@ class StartScreen(QWidget):
         self._runs.show_runs(state.runs)
         for button in (self._try, self._last, self._connect):
             button.setEnabled(not state.busy)
-        is_first = not (state.connected or state.last_device)
-        set_property(self._try, "primary", "true" if is_first else "false")
+        likely = None if state.connected else self._last if state.last_device else self._try
+        for button in (self._try, self._last):
+            set_property(button, "primary", "true" if button is likely else "false")
 
     def showEvent(self, event: QShowEvent) -> None:  # noqa: N802
         super().showEvent(event)

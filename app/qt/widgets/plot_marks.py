@@ -52,13 +52,27 @@ def place_region(item: Any, span: tuple[float, float] | None) -> None:
         item.setRegion(span)
 
 
-class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
-    def __init__(self, plot: "Plot") -> None:
+class _Backdrop(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
+    """Item behind the curves of a plot, as large as what is in view."""
+
+    def __init__(self, plot: "Plot", depth: float) -> None:
         super().__init__()
+        self.setZValue(depth)
+        plot.add(self)
+
+    def viewTransformChanged(self) -> None:  # noqa: N802
+        super().viewTransformChanged()
+        self.prepareGeometryChange()
+
+    def boundingRect(self) -> QRectF:  # noqa: N802
+        return QRectF(self.viewRect())
+
+
+class ShadedSpans(_Backdrop):
+    def __init__(self, plot: "Plot") -> None:
         self._spans: tuple[tuple[float, float], ...] = ()
         self._brush = QBrush()
-        self.setZValue(_BEHIND)
-        plot.add(self)
+        super().__init__(plot, _BEHIND)
 
     @property
     def spans(self) -> tuple[tuple[float, float], ...]:
@@ -72,13 +86,6 @@ class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no 
         self._brush = brush
         self.update()
 
-    def viewTransformChanged(self) -> None:  # noqa: N802
-        super().viewTransformChanged()
-        self.prepareGeometryChange()
-
-    def boundingRect(self) -> QRectF:  # noqa: N802
-        return QRectF(self.viewRect())
-
     def paint(self, painter: QPainter, *_: Any) -> None:
         seen = self.viewRect()
         for start, end in self._spans:
@@ -87,29 +94,20 @@ class ShadedSpans(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no 
                 painter.fillRect(QRectF(left, seen.top(), right - left, seen.height()), self._brush)
 
 
-class Grid(pg.GraphicsObject):  # type: ignore[misc]  # pyqtgraph has no types
+class Grid(_Backdrop):
     """Lines at the ticks of both axes.
 
     Those of pyqtgraph's axes are pictures as large as the plot, made anew with each step of a zoom.
     """
 
     def __init__(self, plot: "Plot") -> None:
-        super().__init__()
         self._axes = (plot.bottom, plot.left)
         self._colour = QColor()
-        self.setZValue(2 * _BEHIND)
-        plot.add(self)
+        super().__init__(plot, 2 * _BEHIND)
 
     def set_colour(self, ink: str) -> None:
         self._colour = QColor(ink)
         self.update()
-
-    def viewTransformChanged(self) -> None:  # noqa: N802
-        super().viewTransformChanged()
-        self.prepareGeometryChange()
-
-    def boundingRect(self) -> QRectF:  # noqa: N802
-        return QRectF(self.viewRect())
 
     def paint(self, painter: QPainter, *_: Any) -> None:
         seen = self.viewRect()

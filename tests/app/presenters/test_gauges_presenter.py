@@ -420,13 +420,25 @@ def check_form(**changes: Any) -> CheckForm:
     return CheckForm(**{"known": "10", "uncertainty": "0,005", "reference": " gauge block ", **changes})
 
 
+def fill_in_check(desk: Desk, table_m: float = 0.0, **changes: Any) -> None:
+    """Connect, and fill in what a check needs; the gauge rests at `table_m`."""
+    desk.connect()
+    desk.presenter.enter()
+    desk.pass_time(0.5, table_m=table_m)
+    desk.presenter.check.set_form(check_form(**changes))
+
+
+def start_check(desk: Desk) -> None:
+    """Begin a check up to the first reading, which waits for rest."""
+    fill_in_check(desk)
+    desk.presenter.check.advance()
+    desk.presenter.check.advance()
+
+
 def run_check(desk: Desk, moved_m: float, **changes: Any) -> None:
     """The operator's part of a check: at rest at 1 mm, then `moved_m` further."""
     desk.presenter.set_tab(GaugesTab.CHECK)
-    desk.connect()
-    desk.presenter.enter()
-    desk.pass_time(0.5, table_m=1e-3)
-    desk.presenter.check.set_form(check_form(**changes))
+    fill_in_check(desk, 1e-3, **changes)
     desk.presenter.check.advance()
     assert "rest" in desk.presenter.check.state.instruction
     desk.presenter.check.advance()
@@ -456,12 +468,7 @@ def test_a_gauge_is_checked_and_the_verdict_kept(desk: Desk, moved_m: float, pas
 
 
 def test_a_check_waits_for_a_gauge_that_stands_still(desk: Desk) -> None:
-    desk.connect()
-    desk.presenter.enter()
-    desk.pass_time(0.5)
-    desk.presenter.check.set_form(check_form())
-    desk.presenter.check.advance()
-    desk.presenter.check.advance()
+    start_check(desk)
     for step in range(15):
         desk.pass_time(0.1, table_m=1e-4 * step)
     assert "Still moving" in desk.presenter.check.state.reading_status
@@ -571,12 +578,7 @@ def test_a_calibration_is_not_saved_without_the_device_of_its_readings(desk: Des
 
 
 def test_a_lost_device_breaks_a_check_off(desk: Desk) -> None:
-    desk.connect()
-    desk.presenter.enter()
-    desk.pass_time(0.5)
-    desk.presenter.check.set_form(check_form())
-    desk.presenter.check.advance()
-    desk.presenter.check.advance()
+    start_check(desk)
     desk.pass_time(1.5)
     assert "+10" in desk.presenter.check.state.instruction, "the reading at rest is taken"
     desk.presenter.on_device_status(LOST)
@@ -591,10 +593,7 @@ def test_a_lost_device_breaks_a_check_off(desk: Desk) -> None:
 
 def test_a_check_whose_readings_are_taken_outlives_its_device(desk: Desk) -> None:
     desk.presenter.set_tab(GaugesTab.CHECK)
-    desk.connect()
-    desk.presenter.enter()
-    desk.pass_time(0.5)
-    desk.presenter.check.set_form(check_form())
+    fill_in_check(desk)
     for table_m in (0.0, 10e-3):
         desk.presenter.check.advance()
         desk.presenter.check.advance()

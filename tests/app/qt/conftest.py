@@ -13,8 +13,11 @@ from pathlib import Path
 import pytest
 from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtWidgets import QApplication
+from pytestqt.qtbot import QtBot
+from window_desk import Desk
 
 from app.qt.theme import Theme
+from config.schema import RecentUse
 
 
 @pytest.fixture(autouse=True)
@@ -56,3 +59,18 @@ def child_processes() -> set[int]:
             with contextlib.suppress(FileNotFoundError):
                 found |= {int(pid) for pid in task.read_text().split()}
     return found - {getattr(resource_tracker._resource_tracker, "_pid", None)}
+
+
+@pytest.fixture
+def recent() -> RecentUse | None:
+    """What was used at the last start, for `desk`; a file of tests may have another."""
+    return None
+
+
+@pytest.fixture
+def desk(theme: Theme, qtbot: QtBot, recent: RecentUse | None) -> Iterator[Desk]:
+    """An active window on fakes."""
+    made = Desk(theme, qtbot, recent=recent)
+    made.window.activateWindow()
+    yield made
+    made.window.close()

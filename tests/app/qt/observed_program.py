@@ -46,7 +46,9 @@ def place(widget: QWidget, rect: QRect) -> tuple[int, int, int, int]:
 def parts_of(widget: QWidget) -> dict[str, Any]:
     if isinstance(widget, QMenu):
         entries = [action for action in widget.actions() if action.text()]
-        return {"parts": {e.text().replace("&", ""): place(widget, widget.actionGeometry(e)) for e in entries}}
+        return {
+            "parts": {e.text().replace("&", ""): place(widget, widget.actionGeometry(e)) for e in entries}
+        }
     if isinstance(widget, QTableView) and not isinstance(widget, QHeaderView):
         return {"rows": rows_of(widget)}
     plots = getattr(widget, "plots", None)

@@ -180,7 +180,12 @@ class Desk:
 
     def _act(self, *commands: str) -> str:
         done = subprocess.run(
-            ["xdotool", *commands], env=self.environment, capture_output=True, text=True, timeout=20, check=False
+            ["xdotool", *commands],
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            timeout=20,
+            check=False,
         )
         return done.stdout
 

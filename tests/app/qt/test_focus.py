@@ -1,29 +1,20 @@
 """Every screen by keyboard and screen reader: names on all that can be reached, in the order of reading."""
 
-from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
 from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QWidget
-from pytestqt.qtbot import QtBot
 from stage import RUN, analysed
 from test_identify_screen import with_scan
-from test_main_window import Desk
+from window_desk import Desk
 
 from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.screens import Screen
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack
-
-
-@pytest.fixture
-def desk(theme: Theme, qtbot: QtBot) -> Iterator[Desk]:
-    made = Desk(theme, qtbot)
-    yield made
-    made.window.close()
 
 
 def reached_by_tab(window: QWidget) -> list[QWidget]:

@@ -1,29 +1,17 @@
 """The keyboard rules of the window: Enter presses what has the focus, and the focus never moves by itself."""
 
-from collections.abc import Iterator
-
 import pytest
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QToolButton, QWidget
-from pytestqt.qtbot import QtBot
 from stage import END_S, RUN, analysed
 from test_identify_screen import with_scan
-from test_main_window import Desk
+from window_desk import Desk
 
 from app.presenters.base import Chip, Notice, Tone
 from app.presenters.gauges.state import PortCard
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import MoveToTrash
 from app.presenters.screens import Screen
-from app.qt.theme import Theme
-
-
-@pytest.fixture
-def desk(theme: Theme, qtbot: QtBot) -> Iterator[Desk]:
-    made = Desk(theme, qtbot)
-    made.window.activateWindow()
-    yield made
-    made.window.close()
 
 
 def focused() -> QWidget:

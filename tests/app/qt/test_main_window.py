@@ -3,9 +3,8 @@
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from looking import clipped_words, visible_words
@@ -16,101 +15,20 @@ from PySide6.QtWidgets import (
     QComboBox,
     QFileDialog,
     QLabel,
-    QLineEdit,
     QPlainTextEdit,
-    QPushButton,
 )
 from pytestqt.qtbot import QtBot
-from stage import RUN, FakeLauncher, FakePool, FakeWorker, analysed, bench
+from stage import RUN, analysed
+from window_desk import Desk
 
 from app.acquisition.messages import Failed, PortSettings
-from app.presenters.connection import Connection
-from app.presenters.error_reports import ErrorReport, ErrorReporter
+from app.presenters.error_reports import ErrorReport
 from app.presenters.navigator import ConnectForm
-from app.presenters.notices import NoticeSources
-from app.presenters.recent import RecentItems
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
-from app.presenters.start_screen import PortChoice, StartState
-from app.presenters.window import WindowContext, WindowPresenter
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.widgets.shortcuts import HelpDialog
-from app.qt.window import MainWindow
-from config.files import save_stand
-from config.schema import RecentUse, WindowLayout
-from drivers.driver import DeviceDriver
-
-
-class Desk:
-    """A window on fakes."""
-
-    def __init__(
-        self,
-        theme: Theme,
-        qtbot: QtBot,
-        place: WindowLayout | None = None,
-        recent: RecentUse | None = None,
-    ) -> None:
-        self.qtbot = qtbot
-        self.faults = ErrorReporter()
-        self.unfinished = 0
-        self.launcher = FakeLauncher()
-        self.worker = FakeWorker()
-        start = StartState(
-            all_series=bench().all_series,
-            series="1FFM0",
-            protocols=(
-                DeviceDriver("slipstand-binary", "", 1, 460800, verified="not verified on a GSV"),
-                DeviceDriver("csv", "", 2, 115200),
-            ),
-            form=ConnectForm(protocol="slipstand-binary"),
-            recordings=str(Path.home()),
-        )
-        self.presenter = WindowPresenter(
-            Connection(*self.launcher.starters, ErrorReporter().report),
-            self.worker,  # type: ignore[arg-type]
-            FakePool(),
-            WindowContext(
-                bench(),
-                start,
-                list_ports=lambda: (PortChoice("COM7", "FT232R"),),
-                notices=NoticeSources(lambda: self.unfinished),
-                recent=RecentItems(recent),
-                save_stand=save_stand,
-            ),
-            self.faults,
-        )
-        self.window = MainWindow(theme, self.presenter, place)
-        qtbot.addWidget(self.window)
-        self.window.show()
-        qtbot.waitExposed(self.window)
-
-    def button(self, text: str) -> QPushButton:
-        (found,) = [b for b in self.window.findChildren(QPushButton) if b.text() == text and b.isVisible()]
-        return found
-
-    def click(self, text: str) -> None:
-        self.qtbot.mouseClick(self.button(text), Qt.MouseButton.LeftButton)
-
-    def press_number_of(self, screen: Screen) -> None:
-        number = list(Screen).index(screen) + 1
-        self.qtbot.keyClick(self.window, str(number), Qt.KeyboardModifier.ControlModifier)
-
-    def words(self) -> str:
-        return visible_words(self.window)
-
-    def field(self, name: str) -> QLineEdit:
-        (found,) = [
-            f for f in self.window.findChildren(QLineEdit) if f.accessibleName() == name and f.isVisible()
-        ]
-        return found
-
-
-@pytest.fixture
-def desk(theme: Theme, qtbot: QtBot) -> Iterator[Desk]:
-    made = Desk(theme, qtbot)
-    yield made
-    made.window.close()
+from config.schema import WindowLayout
 
 
 def test_what_the_first_paint_needs_loads_nothing_heavy() -> None:

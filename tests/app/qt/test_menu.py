@@ -1,6 +1,5 @@
 """The menu of the program: reached by key, with About, documentation and log."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -8,21 +7,11 @@ from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt, qVersion
 from PySide6.QtGui import QAction, QDesktopServices
 from PySide6.QtWidgets import QApplication, QMenu, QPushButton
-from pytestqt.qtbot import QtBot
-from test_main_window import Desk
+from window_desk import Desk
 
 from app.log import FOLDER_VARIABLE
 from app.qt.menu import AboutDialog
-from app.qt.theme import Theme
 from app.version import __version__
-
-
-@pytest.fixture
-def desk(theme: Theme, qtbot: QtBot) -> Iterator[Desk]:
-    made = Desk(theme, qtbot)
-    made.window.activateWindow()
-    yield made
-    made.window.close()
 
 
 def action(desk: Desk, text: str) -> QAction:

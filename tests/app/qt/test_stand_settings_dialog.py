@@ -8,7 +8,7 @@ from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
-from test_main_window import Desk
+from window_desk import Desk
 
 from app.presenters.base import NoticeAction
 from app.presenters.screens import Screen

@@ -1,14 +1,12 @@
 """The Start screen: last amplifier and recent runs at one click, and amplifiers found on the ports."""
 
-from collections.abc import Iterator
-
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import Call
-from test_main_window import Desk
+from window_desk import Desk
 
 from app.acquisition.messages import PortSettings
 from app.presenters.base import Chip, Tone
@@ -24,11 +22,8 @@ RUNS = tuple(f"/recordings/20260112T1015{number:02d}_1FFM0_{number:03d}.h5" for 
 
 
 @pytest.fixture
-def desk(theme: Theme, qtbot: QtBot) -> Iterator[Desk]:
-    made = Desk(theme, qtbot, recent=RecentUse(LAST, RUNS))
-    made.window.activateWindow()
-    yield made
-    made.window.close()
+def recent() -> RecentUse:
+    return RecentUse(LAST, RUNS)
 
 
 def test_the_last_amplifier_is_connected_with_one_key(desk: Desk) -> None:

@@ -6,7 +6,7 @@ from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QMainWindow, QSplitter, QTableWidget, QWidget
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker, analysed
-from test_main_window import Desk
+from window_desk import Desk
 
 from app.presenters.identify.presenter import IdentifyPresenter
 from app.presenters.identify.report import ReportPresenter
