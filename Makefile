@@ -14,8 +14,10 @@ QT_PACKAGES := libegl1 libgl1 libopengl0 libxkbcommon0 libxkbcommon-x11-0 libdbu
 	libxcb-shm0 libxcb-sync1 libxcb-xfixes0 libxcb-xinerama0 libxcb-xkb1
 # What compiles the Arduino firmware, and the simulator that its tests run it in.
 FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
+# A window system, its window manager, and hands of an operator, for tests of the window.
+DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 
-.PHONY: docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools
+.PHONY: docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -30,6 +32,7 @@ help:
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make windows  demo, ports, window and tests on Windows' Python under Wine, as root (docs/systems.md); the first time half an hour"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
+	@echo "make desktop-tools   window system and manager for the test of a day in the window, which is skipped without them"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
 	@echo "make docs    the documentation site into docs/_build/html, which needs no network"
 	@echo "make translations   new texts into the catalogues of messages/locale"
@@ -50,6 +53,9 @@ system-libraries:
 
 firmware-tools:
 	@$(call install_packages,$(FIRMWARE_PACKAGES),true)
+
+desktop-tools:
+	@$(call install_packages,$(DESKTOP_TEST_PACKAGES),true)
 
 # $(1): packages of Debian and Ubuntu that must be there; $(2): a command that may add to $$missing.
 define install_packages

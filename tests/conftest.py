@@ -43,6 +43,7 @@ REALTIME_FILES = {
     "test_stand_process.py",
     "test_whole_flow.py",
     "test_day_by_keys.py",
+    "test_day_on_a_display.py",
     "test_firmware_record.py",
 }
 

@@ -98,7 +98,7 @@ class StartScreen(QWidget):
         self._presenter.refresh()
 
     def _press_primary(self) -> None:
-        """Press what Enter means: the button of the fields in use, else what connects as at the last start."""
+        """Connect as the fields in use say, else as at the last start, else to the simulated stand."""
         state, focused = self._presenter.state, QApplication.focusWidget()
         if focused is not None and self._form.isAncestorOf(focused):
             self._connect.click()

@@ -15,7 +15,14 @@ from app.presenters.device_status import DeviceStatus
 from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.check import CheckPresenter
 from app.presenters.gauges.ports import PortsPresenter
-from app.presenters.gauges.state import NAMES, ActiveCalibrations, GaugeCard, GaugesState, GaugesTab
+from app.presenters.gauges.state import (
+    NAMES,
+    NO_SAMPLES,
+    ActiveCalibrations,
+    GaugeCard,
+    GaugesState,
+    GaugesTab,
+)
 from app.presenters.navigator import Navigator
 from app.presenters.number_text import format_displacement, format_in
 from app.presenters.results import sentence
@@ -108,6 +115,9 @@ class GaugesPresenter(Presenter[GaugesState]):
         for tab in (self.calibration, self.check):
             tab.set_stopped(status.stopped_at)
         self._update(stopped_at=status.stopped_at)
+        if self.state.device:
+            lost = gettext(NO_SAMPLES, time=status.stopped_at)
+            self._update(health_note=lost if status.stopped_at else gettext(_WAITING))
 
     def on_rows(self, rows: RingRows) -> None:
         self._recent.append(rows)

@@ -534,6 +534,16 @@ def test_a_lost_device_ends_an_average_and_dates_what_is_shown(desk: Desk) -> No
     assert desk.presenter.calibration.state.reading_status == ""
 
 
+def test_a_device_lost_before_its_gauges_were_looked_at_is_told(desk: Desk) -> None:
+    desk.connect()
+    assert "let the stand rest" in desk.state.health_note
+    desk.presenter.on_device_status(LOST)
+    desk.presenter.enter()
+    assert desk.state.health_note == "No sample has come since 14:03:21: look at device and cable"
+    desk.presenter.on_device_status(LIVE)
+    assert "let the stand rest" in desk.state.health_note
+
+
 def test_samples_before_and_after_a_loss_are_not_averaged_together(desk: Desk) -> None:
     desk.connect()
     desk.presenter.enter()

@@ -1,4 +1,4 @@
-"""The program as `slipstand` starts it, told what it shows: `python observed_program.py SOCKET [--simulated]`.
+"""The program, which tells what it shows: `python observed_program.py SOCKET [--simulated]`.
 
 Whoever connects to the local socket receives all visible widgets as JSON. Nothing can be done to the program
 there: keys and pointer come from the window system.

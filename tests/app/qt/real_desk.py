@@ -138,6 +138,14 @@ class Desk:
     def press(self, *keys: str) -> None:
         self._act("key", "--clearmodifiers", *keys)
 
+    def tab_to(self, text: str) -> None:
+        """Go on by Tab until a button has the focus."""
+        for _ in range(60):
+            if (self.focused() or {"text": ""})["text"].startswith(text):
+                return
+            self.press("Tab")
+        pytest.fail(f"Tab does not reach {text!r}")
+
     def write(self, text: str) -> None:
         self._act("type", "--delay", "8", text)
 
@@ -172,7 +180,8 @@ class Desk:
     def clipboard(self, target: str = "UTF8_STRING") -> bytes:
         """What a program that pastes receives."""
         command = ["xclip", "-selection", "clipboard", "-out", "-target", target]
-        return subprocess.run(command, env=self.environment, capture_output=True, timeout=20).stdout
+        done = subprocess.run(command, env=self.environment, capture_output=True, timeout=20, check=False)
+        return done.stdout
 
     def title(self) -> str:
         """Title of the active window, as the window manager knows it."""

@@ -2,6 +2,7 @@
 
 import pytest
 from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QToolButton, QWidget
 from stage import END_S, RUN, analysed
 from test_identify_screen import with_scan
@@ -10,7 +11,7 @@ from window_desk import Desk
 from app.presenters.base import Chip, Notice, Tone
 from app.presenters.gauges.state import PortCard
 from app.presenters.navigator import ConnectForm
-from app.presenters.record.state import MoveToTrash
+from app.presenters.record.state import Action, MoveToTrash
 from app.presenters.screens import Screen
 
 
@@ -129,3 +130,13 @@ def test_no_part_of_a_screen_is_a_window_for_a_moment_which_would_take_the_focus
     assert windows.found == []
     assert desk.window.isActiveWindow()
     assert focused() is desk.window.home()
+
+
+def test_enter_arms_where_arming_comes_next_and_a_key_held_down_does_not(desk: Desk) -> None:
+    desk.click("Try with the simulated stand")
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.primary is Action.ARM, timeout=5000)
+    held = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Return, Qt.KeyboardModifier.NoModifier, "", True)
+    QApplication.sendEvent(focused(), held)
+    assert Action.ARM in desk.presenter.record.state.allowed
+    press(desk, Qt.Key.Key_Return)
+    assert Action.ARM not in desk.presenter.record.state.allowed

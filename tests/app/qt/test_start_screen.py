@@ -79,6 +79,7 @@ def test_an_amplifier_that_is_found_is_connected_by_enter(desk: Desk) -> None:
     assert clipped_words(dialog) == []
     (connect,) = [button for button in dialog.findChildren(QPushButton) if button.text() == "Connect"]
     assert dialog.focusWidget() is connect
+    dialog.activateWindow()
     desk.qtbot.keyClick(connect, Qt.Key.Key_Return)
     assert not dialog.isVisible()
     assert desk.presenter.state.screen is Screen.RECORD
@@ -101,3 +102,34 @@ def test_closing_the_dialog_stops_looking(desk: Desk) -> None:
     dialog, _ = find(desk)
     desk.qtbot.keyClick(dialog, Qt.Key.Key_Escape)
     assert desk.presenter.gauges.ports._worker.cancelled == 1  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Enter])
+def test_enter_connects_as_the_coloured_button_says(desk: Desk, key: Qt.Key) -> None:
+    assert desk.button("Connect again").property("primary") == "true"
+    assert desk.button("Try with the simulated stand").property("primary") == "false"
+    desk.qtbot.keyClick(desk.window, key)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.presenter.show_screen(Screen.START)
+    assert desk.button("Connect again").property("primary") == "false"
+    desk.qtbot.keyClick(desk.window, key)
+    assert [port.url for port in desk.launcher.ports] == [LAST.port]
+
+
+def test_enter_at_the_first_start_tries_the_simulated_stand(theme: Theme, qtbot: QtBot) -> None:
+    desk = Desk(theme, qtbot)
+    desk.window.activateWindow()
+    assert desk.button("Try with the simulated stand").property("primary") == "true"
+    desk.qtbot.keyClick(desk.window, Qt.Key.Key_Return)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    assert len(desk.launcher.simulations) == 1
+    desk.window.close()
+
+
+def test_enter_in_a_field_connects_what_is_filled_in(desk: Desk) -> None:
+    desk.field("Baud").setFocus()
+    desk.qtbot.keyClicks(desk.field("Baud"), "9600")
+    desk.qtbot.keyClick(desk.field("Baud"), Qt.Key.Key_Return)
+    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=5000)
+    assert [port.baud for port in desk.launcher.ports] == [9600]
+    assert desk.launcher.simulations == []
