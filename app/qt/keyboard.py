@@ -3,6 +3,7 @@
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QKeyEvent, QShowEvent
 from PySide6.QtWidgets import QApplication, QMainWindow, QPushButton, QToolButton, QWidget
+from shiboken6 import isValid
 
 _ENTER = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
@@ -12,6 +13,7 @@ class KeyboardWindow(QMainWindow):
 
     def __init__(self) -> None:
         super().__init__()
+        self._focused_before: QWidget | None = None
         QApplication.instance().focusChanged.connect(self._on_focus_changed)  # type: ignore[union-attr]
 
     def home(self) -> QWidget | None:
@@ -28,6 +30,17 @@ class KeyboardWindow(QMainWindow):
         """Choose the focus at the start, which Qt would give to the first button."""
         super().showEvent(event)
         if not event.spontaneous():
+            self.focus_home()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
+        """Where the focus was disabled or hidden behind a dialog, choose it anew: Qt has passed it on."""
+        super().changeEvent(event)
+        if event.type() != QEvent.Type.ActivationChange:
+            return
+        before, self._focused_before = self._focused_before, None
+        if not self.isActiveWindow():
+            self._focused_before = self.focusWidget()
+        elif before is not None and isValid(before) and not (before.isVisible() and before.isEnabled()):
             self.focus_home()
 
     def event(self, event: QEvent) -> bool:

@@ -18,7 +18,7 @@ import pytest
 
 NEEDED = ("Xvfb", "openbox", "xdotool", "xclip")
 SIZE = "1400x900x24"
-PATIENCE_S = 40.0
+PATIENCE_S = 90.0
 Place = tuple[int, int, int, int]
 Shown = dict[str, Any]
 _PROGRAM = Path(__file__).with_name("observed_program.py")
@@ -98,7 +98,7 @@ class Desk:
         while not (found := seen()):
             if time.perf_counter() > deadline or self.process.poll() is not None:
                 pytest.fail(f"{what} did not come; the window shows:\n{self.words()}")
-            time.sleep(0.05)
+            time.sleep(0.1)
         return found
 
     def wait_for(self, *words: str) -> None:

@@ -265,6 +265,7 @@ def review(desk: Desk, first: Path, home: Path) -> None:
     report = first.with_suffix(".pdf")
     desk.wait_for(f"Wrote {report}")
     assert report.read_bytes().startswith(b"%PDF")
+    assert "QAbstractButton" not in desk.focused()["kind"], "Enter would press what nobody chose"
 
 
 def bring_a_file(desk: Desk, home: Path) -> None:

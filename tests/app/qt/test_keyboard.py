@@ -3,7 +3,7 @@
 import pytest
 from PySide6.QtCore import QEvent, QObject, Qt
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QToolButton, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QLineEdit, QPushButton, QToolButton, QWidget
 from stage import END_S, RUN, analysed
 from test_identify_screen import with_scan
 from window_desk import Desk
@@ -140,3 +140,17 @@ def test_enter_arms_where_arming_comes_next_and_a_key_held_down_does_not(desk: D
     assert Action.ARM in desk.presenter.record.state.allowed
     press(desk, Qt.Key.Key_Return)
     assert Action.ARM not in desk.presenter.record.state.allowed
+
+
+def test_a_button_disabled_behind_a_dialog_passes_its_focus_to_no_other(desk: Desk) -> None:
+    button = desk.button("Open a recording")
+    button.setFocus()
+    dialog = QDialog(desk.window)
+    dialog.show()
+    dialog.activateWindow()
+    desk.qtbot.waitUntil(dialog.isActiveWindow)
+    button.setEnabled(False)
+    dialog.close()
+    desk.window.activateWindow()
+    desk.qtbot.waitUntil(desk.window.isActiveWindow)
+    assert desk.window.focusWidget() is desk.window.home()

@@ -22,8 +22,8 @@ RUNS = tuple(f"/recordings/20260112T1015{number:02d}_1FFM0_{number:03d}.h5" for 
 
 
 @pytest.fixture
-def recent() -> RecentUse:
-    return RecentUse(LAST, RUNS)
+def recent(request: pytest.FixtureRequest) -> RecentUse | None:
+    return getattr(request, "param", RecentUse(LAST, RUNS))
 
 
 def test_the_last_amplifier_is_connected_with_one_key(desk: Desk) -> None:
@@ -80,6 +80,7 @@ def test_an_amplifier_that_is_found_is_connected_by_enter(desk: Desk) -> None:
     (connect,) = [button for button in dialog.findChildren(QPushButton) if button.text() == "Connect"]
     assert dialog.focusWidget() is connect
     dialog.activateWindow()
+    desk.qtbot.waitUntil(dialog.isActiveWindow)
     desk.qtbot.keyClick(connect, Qt.Key.Key_Return)
     assert not dialog.isVisible()
     assert desk.presenter.state.screen is Screen.RECORD
@@ -116,14 +117,13 @@ def test_enter_connects_as_the_coloured_button_says(desk: Desk, key: Qt.Key) -> 
     assert [port.url for port in desk.launcher.ports] == [LAST.port]
 
 
-def test_enter_at_the_first_start_tries_the_simulated_stand(theme: Theme, qtbot: QtBot) -> None:
-    desk = Desk(theme, qtbot)
-    desk.window.activateWindow()
+@pytest.mark.parametrize("recent", [None], indirect=True)
+def test_enter_at_the_first_start_tries_the_simulated_stand(desk: Desk) -> None:
+    desk.qtbot.waitUntil(desk.window.isActiveWindow)
     assert desk.button("Try with the simulated stand").property("primary") == "true"
     desk.qtbot.keyClick(desk.window, Qt.Key.Key_Return)
     desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
     assert len(desk.launcher.simulations) == 1
-    desk.window.close()
 
 
 def test_enter_in_a_field_connects_what_is_filled_in(desk: Desk) -> None:
