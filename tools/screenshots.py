@@ -1,17 +1,18 @@
 """Pictures of every screen with real content: `python -m tools.screenshots FOLDER`.
 
 A pullback is recorded from the simulated stand meanwhile, one of a stand that is not ideal and a campaign are
-simulated, so it takes some minutes. Each moment is drawn in both themes and two sizes, without a window
-system.
+simulated, so it takes some minutes. Each moment is drawn in both themes and each size, without a window
+system. `QT_SCALE_FACTOR=2` doubles the pixels of each.
 """
 
+import argparse
 import datetime
 import os
 import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,7 @@ from app.runs.metadata import create_metadata
 from app.runs.simulated import store_motion
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import load_gauges, load_stand, settings_file
-from messages.i18n import gettext
+from messages.i18n import ENGLISH, gettext, languages, use_language
 
 SIZES = ((1280, 800), (1920, 1080))
 THEMES = {"light": Qt.ColorScheme.Light, "dark": Qt.ColorScheme.Dark}
@@ -59,16 +60,19 @@ class ScreenshotError(Exception):
 class Camera:
     """Draws a window in every theme and size, into files of `folder`."""
 
-    def __init__(self, theme: Theme, window: MainWindow, folder: Path) -> None:
+    def __init__(
+        self, theme: Theme, window: MainWindow, folder: Path, sizes: Sequence[tuple[int, int]]
+    ) -> None:
         self._theme = theme
         self._window = window
         self._folder = folder
+        self._sizes = sizes
 
     def shoot(self, name: str) -> None:
         """Write `name-light-1280x800.png` and its like."""
         for theme, scheme in THEMES.items():
             self._theme.fix(scheme)
-            for width, height in SIZES:
+            for width, height in self._sizes:
                 self._window.resize(width, height)
                 QCursor.setPos(self._window.mapToGlobal(QPoint(4, height - 4)))
                 QApplication.processEvents()
@@ -86,7 +90,7 @@ class Camera:
         dialog.close()
 
 
-def take_all(folder: Path) -> None:
+def take_all(folder: Path, sizes: Sequence[tuple[int, int]] = SIZES) -> None:
     """Record a pullback from the simulated stand, and draw each screen on the way. Raises ScreenshotError."""
     folder.mkdir(parents=True, exist_ok=True)
     app = QApplication.instance() or QApplication(sys.argv[:1])
@@ -96,7 +100,7 @@ def take_all(folder: Path) -> None:
     theme = Theme(app)
     window = MainWindow(theme, presenter)
     window.show()
-    camera = Camera(theme, window, folder)
+    camera = Camera(theme, window, folder, sizes)
     try:
         _play(presenter, camera)
         _shoot_dialogs(window, presenter, camera)
@@ -111,6 +115,7 @@ def _play(presenter: WindowPresenter, camera: Camera) -> None:
     presenter.open_simulated(_STAND.series)
     wait = _Patience(presenter).wait
     wait(lambda: record.state.primary is Action.ARM, "the simulated stand is there")
+    record.count_simulated(True)
     record.dispatch(PlanEdited(_PLAN))
     record.dispatch(_FORM)
     record.dispatch(Action.ARM)
@@ -274,11 +279,19 @@ class _Patience:
             time.sleep(0.005)
 
 
+def _size(text: str) -> tuple[int, int]:
+    width, height = text.split("x")
+    return int(width), int(height)
+
+
 def main() -> int:
-    """Return the exit code: 1 if a picture could not be taken, 2 without a folder."""
-    if len(sys.argv) != 2:
-        sys.stderr.write("usage: python -m tools.screenshots FOLDER\n")
-        return 2
+    """Return the exit code: 1 if a picture could not be taken."""
+    parser = argparse.ArgumentParser(prog="python -m tools.screenshots", description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--language", choices=languages(), default=ENGLISH)
+    parser.add_argument("--size", type=_size, action="append", metavar="WIDTHxHEIGHT", help="may be repeated")
+    options = parser.parse_args()
+    use_language(options.language)
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     with tempfile.TemporaryDirectory(prefix="slipstand-") as recordings:
         os.environ["SLIPSTAND_RECORDINGS"] = str(Path(recordings) / "recordings")
@@ -288,7 +301,7 @@ def main() -> int:
             shutil.copy(settings_file(name), settings)
         os.environ["SLIPSTAND_CONFIG"] = str(settings)
         try:
-            take_all(Path(sys.argv[1]))
+            take_all(options.folder, options.size or SIZES)
         except ScreenshotError as error:
             sys.stderr.write(f"error: {error}\n")
             return 1

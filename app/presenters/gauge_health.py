@@ -15,6 +15,10 @@ from messages.i18n import gettext, translate
 GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
 
 
+def _percent(fraction: float, decimals: int) -> str:
+    return with_unit(f"{100.0 * fraction:.{decimals}f}", "%")
+
+
 @dataclass(frozen=True, slots=True)
 class SymptomText:
     code: str
@@ -57,11 +61,11 @@ def _figures(health: GaugeHealth) -> tuple[LabelledValue, ...]:
         gettext("noise, rms"): _micrometres(health.noise_rms_m),
         gettext("drift"): with_unit(f"{drift} ± {uncertainty}", "µm/min"),
         **hums,
-        gettext("range used"): MINUS if used is None else f"{used:.0%}",
+        gettext("range used"): MINUS if used is None else _percent(used, 0),
         gettext("converter step"): _micrometres(health.resolution_m),
-        gettext("overloaded"): f"{health.overload_fraction:.2%}",
-        gettext("clipped"): f"{health.clipped_fraction:.2%}",
-        gettext("missing"): f"{health.missing_fraction:.2%}",
+        gettext("overloaded"): _percent(health.overload_fraction, 2),
+        gettext("clipped"): _percent(health.clipped_fraction, 2),
+        gettext("missing"): _percent(health.missing_fraction, 2),
     }
     return tuple(LabelledValue(label, value) for label, value in figures.items())
 

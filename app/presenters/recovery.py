@@ -4,6 +4,7 @@ import datetime
 from dataclasses import dataclass
 from pathlib import Path
 
+from analysis.formatting import with_unit
 from app.presenters.base import Notice, NoticeAction, Progress, Tone
 from app.presenters.results import end_status, sentence
 from app.runs.unattended import UnattendedRun
@@ -50,7 +51,7 @@ def unattended_notice(run: UnattendedRun, today: datetime.date) -> Notice:
 def recovery_progress(progress: Progress | None = None) -> Notice:
     if progress is None or progress.fraction is None:
         return Notice(gettext("Recovering runs"), Tone.PLAIN)
-    return Notice(f"{progress.text}: {progress.fraction:.0%}", Tone.PLAIN)
+    return Notice(f"{progress.text}: {with_unit(f'{100 * progress.fraction:.0f}', '%')}", Tone.PLAIN)
 
 
 def recovery_outcome(recovered: RecoveryReport) -> Notice:

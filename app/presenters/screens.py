@@ -21,7 +21,7 @@ class Screen(StrEnum):
     RUNS = "runs", N_("Runs"), "stack"
     CAMPAIGN = "campaign", N_("Campaign"), "table"
     GAUGES = "gauges", N_("Gauges"), "gauge"
-    STAND = "stand", N_("Stand"), "flask"
+    STAND = "stand", N_("Simulated"), "flask"
     SETTINGS = "settings", N_("Settings"), "gear"
 
     def __new__(cls, name: str, label: str, icon: str) -> "Screen":

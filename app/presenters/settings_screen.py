@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.catalogue import DISPLACEMENT_UNITS
+from analysis.formatting import with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Presenter, Tone
 from app.presenters.results import sentence
 from config.schema import ConfigError, Settings, Stand
@@ -15,7 +16,7 @@ from messages.message import message_of
 CHOICES: dict[str, dict[Any, str]] = {
     "theme": {"system": N_("As the system"), "light": N_("Light"), "dark": N_("Dark")},
     "language": {"system": N_("As the system"), **language_names()},
-    "scale": {scale: f"{scale:.0%}" for scale in (1.0, 1.25, 1.5, 1.75, 2.0)},
+    "scale": {scale: with_unit(f"{100 * scale:.0f}", "%") for scale in (1.0, 1.25, 1.5, 1.75, 2.0)},
     "displacement_unit": {name: unit.symbol for name, unit in DISPLACEMENT_UNITS.items()},
     "log_level": {
         "error": N_("Errors only"),

@@ -91,7 +91,7 @@ def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simu
     interrupts = _close_on_interrupt(presenter)
     window.show()
     if simulated is None:
-        QTimer.singleShot(0, window, window.show_last_screen)
+        window.show_last_screen_soon()
         QTimer.singleShot(0, window, presenter.connect_at_start)
     else:
         QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))

@@ -15,7 +15,15 @@ from app.presenters.settings_screen import (
     SettingsState,
 )
 from app.qt.theme import TextRole
-from app.qt.widgets.inputs import CheckBox, ComboBox, ask_for_folder, make_button, make_choice, show_texts
+from app.qt.widgets.inputs import (
+    CheckBox,
+    ComboBox,
+    ask_for_folder,
+    make_button,
+    make_choice,
+    show_default,
+    show_texts,
+)
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
@@ -42,7 +50,7 @@ class SettingsScreen(QWidget):
         self._choices = {name: self._choice(name) for name in CHOICES}
         self._operator = QLineEdit()
         self._recordings = QLineEdit()
-        self._recordings.setPlaceholderText(presenter.personal.recordings)
+        show_default(self._recordings, presenter.personal.recordings)
         self._sounds = CheckBox(gettext("Sound at each state of a pullback"))
         self._simulated = CheckBox(gettext("Simulated runs count in the plan and on Campaign"))
         self._connects = CheckBox(gettext("Connect to the last amplifier at the start"))

@@ -6,7 +6,7 @@ from PySide6.QtWidgets import QFrame, QGridLayout, QLineEdit, QWidget
 
 from app.presenters.stand_screen import StandForm, StandPresenter, StandState
 from app.qt.theme import TextRole, set_property
-from app.qt.widgets.inputs import ComboBox, make_button, show_texts
+from app.qt.widgets.inputs import ComboBox, make_button, show_default, show_texts
 from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.text import ValueGrid, label, plain_text, set_text_or_hide, show_chip
@@ -64,7 +64,7 @@ class StandScreen(QWidget):
         self._series.setCurrentText(state.form.series)
         show_texts(self._fields, state.form)
         for name, field in self._fields.items():
-            field.setPlaceholderText(getattr(state.defaults, name))
+            show_default(field, getattr(state.defaults, name))
         show_texts({"fault_duration_s": self._seconds}, state)
         set_property(self._start, "primary", "false" if state.is_running else "true")
         show_chip(self._message, state.message)
@@ -102,9 +102,9 @@ class StandScreen(QWidget):
             _add(grid, line, gettext(_FIELDS[name][0]), field, gettext(_FIELDS[name][1]))
         effects = self._fields["effects"]
         effects.setToolTip("\n".join((effects.toolTip(), *LISTED)))
-        effects.setPlaceholderText(gettext("none"))
-        hint = gettext("An empty field means the value in grey.")
-        return _card(gettext("Set up the stand"), hint, grid, self._start, self._message)
+        show_default(effects, gettext("none"))
+        hint = gettext("Empty a field for its usual value.")
+        return _card(gettext("Set up the simulated stand"), hint, grid, self._start, self._message)
 
     def _faults_card(self) -> QFrame:
         grid = QGridLayout()

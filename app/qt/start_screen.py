@@ -13,7 +13,7 @@ from app.presenters.navigator import ConnectForm
 from app.presenters.recent import RUNS_MAX
 from app.presenters.start_screen import StartPresenter, StartState
 from app.qt.theme import TextRole, set_property
-from app.qt.widgets.inputs import ComboBox, make_button, show_texts
+from app.qt.widgets.inputs import ComboBox, make_button, show_default, show_texts
 from app.qt.widgets.layouts import (
     STRETCH,
     Item,
@@ -186,7 +186,7 @@ class _Form(QWidget):
         self._stop_bits = ComboBox()
         self._stop_bits.addItems(["1", "2"])
         self._fields = {name: QLineEdit() for name in ("baud", "rate_hz", "settings", "relative_port")}
-        self._fields["rate_hz"].setPlaceholderText(gettext("as the device is set"))
+        show_default(self._fields["rate_hz"], gettext("as the device is set"))
         self._fields["settings"].setPlaceholderText("KEY=VALUE KEY=VALUE")
         self._fields["relative_port"].setPlaceholderText(gettext("if it has a device of its own"))
         self._more = QPushButton(gettext("More settings"))
@@ -225,7 +225,7 @@ class _Form(QWidget):
         if has_rare and form != state.last_form:  # those of the last device need not be looked at
             self._more.setChecked(True)
         usual = state.selected_protocol.default_baud if state.selected_protocol else None
-        self._fields["baud"].setPlaceholderText(f"{usual}" if usual else gettext("the protocol's usual one"))
+        show_default(self._fields["baud"], f"{usual}" if usual else gettext("the protocol's usual one"))
 
     def _read(self) -> ConnectForm:
         return ConnectForm(

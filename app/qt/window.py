@@ -61,6 +61,7 @@ class MainWindow(KeyboardWindow):
         self._export: QDialog | None = None
         self._import: QDialog | None = None
         self._help: QDialog | None = None
+        self._awaits_last_screen = False
         self._stack = QStackedWidget()
         self._notice = NoticeBar(presenter)
         self._rail = {screen: self._rail_button(screen) for screen in Screen}
@@ -94,8 +95,14 @@ class MainWindow(KeyboardWindow):
     def home(self) -> QWidget | None:
         return self._stack.currentWidget()
 
+    def show_last_screen_soon(self) -> None:
+        """Show the screen of the last session once the window is there; it is not forgotten before."""
+        self._awaits_last_screen = True
+        QTimer.singleShot(0, self, self.show_last_screen)
+
     def show_last_screen(self) -> None:
         """Show the screen of the last session, unless another one is shown by now."""
+        self._awaits_last_screen = False
         known = [screen for screen in Screen if screen.value == self._geometry.screen]
         if known and self._shown.screen is Screen.START:
             self._presenter.show_screen(known[0])
@@ -171,7 +178,8 @@ class MainWindow(KeyboardWindow):
             event.ignore()
             return
         self._timer.stop()
-        self.closed.emit(self._geometry.capture(self, self._shown.screen.value))
+        shown = self._geometry.screen if self._awaits_last_screen else self._shown.screen.value
+        self.closed.emit(self._geometry.capture(self, shown))
         self.hide()
         self._presenter.close()
         super().closeEvent(event)

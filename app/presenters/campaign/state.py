@@ -28,6 +28,11 @@ class TableRow:
     cells: tuple[Cell, ...]  # in the order of the columns
     status: Chip = EMPTY_CHIP  # most important warning about the series
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is known of the series but its name."""
+        return not self.runs and not self.status.text
+
 
 def row_without_runs(code: str) -> TableRow:
     empty = Cell(hint=gettext("No run of {series} yet.", series=code))

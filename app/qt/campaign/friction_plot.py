@@ -25,6 +25,7 @@ _TICKS_HEIGHT, _ROOM = 44, 220
 """Of two lines below the axis, and for the name of a contact, in pixels."""
 
 
+_TITLE = N_("friction by contact &nbsp; {static} static f<sub>s</sub> &nbsp; {dynamic} dynamic f<sub>d</sub>")
 _COLUMNS: tuple[tuple[str, Callable[[Quantity], float]], ...] = (
     ("{symbol}", lambda mean: mean.value),
     (N_("{symbol}, lower end of 95 %"), lambda mean: mean.interval_95[0]),
@@ -40,11 +41,10 @@ class FrictionPlot(QWidget):
         self._theme = theme
         self._contacts: tuple[ContactBars, ...] = ()
         self._items: list[Any] = []
-        title = gettext("friction by contact &nbsp; ▨ static f<sub>s</sub> &nbsp; ■ dynamic f<sub>d</sub>")
         self.setToolTip(
             gettext("Bars: mean over the series with its 95 % interval; points: series; ▲ at least")
         )
-        self._stack = PlotStack(theme, ((title, "text"),), format_point=_format_point)
+        self._stack = PlotStack(theme, (("", "text"),), format_point=_format_point)
         self._stack.table = self._table
         self._stack.plots[0].bottom.setHeight(_TICKS_HEIGHT)
         self._stack.resized.connect(lambda _: self._name_contacts())
@@ -86,6 +86,11 @@ class FrictionPlot(QWidget):
         self._stack.restyle()
         self._stack.set_time_title("")
         tokens = self._theme.tokens
+        static, dynamic = (
+            f'<span style="color: {token}">{swatch}</span>'
+            for token, swatch in ((tokens.channel_1, "▨"), (tokens.channel_2, "■"))
+        )
+        self._stack.set_title(0, gettext(_TITLE, static=static, dynamic=dynamic))
         tops: list[float] = []
         for x, bars in enumerate(self._contacts):
             static_x, dynamic_x = x - _WIDTH / 2, x + _WIDTH / 2
@@ -139,7 +144,9 @@ def _spread_out(x: float, count: int) -> Floats:
 
 def _tick_text(bars: ContactBars, *, has_room: bool) -> str:
     text = f"{bars.contact}: {bars.name}" if bars.name and has_room else bars.contact
-    return f"{text}\nf_s/f_d = {bars.ratio}" if bars.ratio else text
+    return "\n".join(
+        filter(None, (text, bars.ratio and gettext("static / dynamic = {ratio}", ratio=bars.ratio)))
+    )
 
 
 def _accessible_text(bars: ContactBars) -> str:

@@ -17,7 +17,7 @@ from app.qt.widgets.folder_button import FolderButton, OpenFolderButton
 from app.qt.widgets.inputs import CheckBox, ProgressBar, ask_for_folder, make_button
 from app.qt.widgets.layouts import STRETCH, clear, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
-from app.qt.widgets.text import break_path, label, show_chip
+from app.qt.widgets.text import ElidedLabel, break_path, label, show_chip
 from messages.i18n import N_, gettext, ngettext
 
 _COLUMN_WIDTH = 360
@@ -56,6 +56,7 @@ class CampaignScreen(QWidget):
         self._table = SeriesTable(theme)
         self._table.row_selected.connect(presenter.select_series)
         self._table.row_opened.connect(presenter.open_row)
+        self._ahead = ElidedLabel()
         self._plot = FrictionPlot(theme)
         self._chosen = SelectedRuns(presenter)
         self._sections = QVBoxLayout()
@@ -95,7 +96,10 @@ class CampaignScreen(QWidget):
         if state.columns != old.columns:
             self._table.show_columns(state.columns)
         if summary.rows != before.rows:
-            self._table.show_rows(summary.rows)
+            self._table.show_rows(tuple(row for row in summary.rows if not row.is_empty))
+            ahead = _series_ahead(summary)
+            self._ahead.set_line(ahead)
+            self._ahead.setVisible(bool(ahead))
         if summary.contacts != before.contacts:
             self._plot.show_contacts(summary.contacts)
         if (state.selected, state.selected_runs) != (old.selected, old.selected_runs):
@@ -143,7 +147,9 @@ class CampaignScreen(QWidget):
 
     def _make_page(self) -> QWidget:
         page = QWidget()
-        tables, figures = (make_frame(self._table), _TABLE_SHARE), (make_frame(self._plot), _FIGURE_SHARE)
+        ahead = make_row((self._ahead, 1), margins=(8, 4))
+        table = make_column((self._table, 1), ahead)
+        tables, figures = (make_frame(table), _TABLE_SHARE), (make_frame(self._plot), _FIGURE_SHARE)
         left = make_column(tables, figures, spacing=8)
         content = QWidget()
         make_column(self._chosen, (self._sections, 1), of=content)
@@ -159,6 +165,18 @@ def _simulated_chip(summary: CampaignSummary) -> Chip:
     if summary.is_mixed:
         return Chip(gettext("SIMULATED and recorded"), Tone.WARN)
     return Chip(gettext("SIMULATED"), Tone.WARN)
+
+
+def _series_ahead(summary: CampaignSummary) -> str:
+    ahead = [row.label for row in summary.rows if row.is_empty]
+    if not ahead:
+        return ""
+    return ngettext(
+        "{count} series has no run yet: {names}",
+        "{count} series have no run yet: {names}",
+        len(ahead),
+        names=", ".join(ahead),
+    )
 
 
 class _Working(QWidget):

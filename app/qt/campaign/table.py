@@ -14,7 +14,7 @@ from PySide6.QtWidgets import (
 
 from app.presenters.campaign.state import Cell, TableRow, all_columns
 from app.qt.theme import TextRole, Theme, font
-from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, serve_table
+from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, TitleHeader, serve_table
 from app.qt.window_geometry import persist_layout
 from messages.i18n import gettext, ngettext
 
@@ -45,7 +45,8 @@ class SeriesTable(QTableWidget):
         self.setTabKeyNavigation(False)
         self.verticalHeader().hide()
         self.verticalHeader().setDefaultSectionSize(_ROW_HEIGHT)
-        header = self.horizontalHeader()
+        header = TitleHeader(self)
+        self.setHorizontalHeader(header)
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setHighlightSections(False)
         header.setProperty("role", "tight")  # in line with the cells

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QPushButton, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QFrame, QGridLayout, QPushButton, QSizePolicy, QToolButton, QWidget
 
 from app.presenters.conditions import CONDITION_TITLES
 from app.presenters.record.state import (
@@ -16,11 +16,18 @@ from app.presenters.record.state import (
     SeriesChosen,
     SeriesProgress,
 )
-from app.qt.theme import TextRole, font, set_property
-from app.qt.widgets.inputs import ESCAPE_AND_ENTER, ComboBox, ShortcutSafeEdit, make_button, show_texts
+from app.qt.theme import TextRole, set_property
+from app.qt.widgets.inputs import (
+    ESCAPE_AND_ENTER,
+    ComboBox,
+    ShortcutSafeEdit,
+    make_button,
+    show_default,
+    show_texts,
+)
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import ENTER_KEYS, add_shortcut, bind_button, set_button_hint
-from app.qt.widgets.text import label
+from app.qt.widgets.text import ElidedLabel, label
 from messages.i18n import N_, gettext, ngettext
 
 _BUTTONS = {
@@ -32,17 +39,18 @@ _BUTTONS = {
 """Label, key and description of each action."""
 _FOLD = N_("Operator, conditions, runs in a row, note")
 _DISARM = (N_("Disarm"), N_("End without a run: the table has not been pulled back"))
-_KEEP = (N_("Keep"), N_("Keep the run with what was found in it, and go on"))
 _STRIP_SPACING = 4
+_COUNT = "1"
+"""Runs in a row where nothing is written."""
 _FORM_FIELDS = {
     "operator": (N_("Operator"), N_("name")),
-    "temperature_c": (CONDITION_TITLES["temperature_c"], "21.5"),
-    "humidity_percent": (CONDITION_TITLES["humidity_percent"], "45"),
+    "temperature_c": (CONDITION_TITLES["temperature_c"], N_("for example 21.5")),
+    "humidity_percent": (CONDITION_TITLES["humidity_percent"], N_("for example 45")),
     "plate_id": (CONDITION_TITLES["plate_id"], N_("which one")),
     "contact_id": (CONDITION_TITLES["contact_id"], N_("which pair of surfaces")),
     "surface_preparation": (CONDITION_TITLES["surface_preparation"], N_("how prepared")),
     "run_in_number": (CONDITION_TITLES["run_in_number"], N_("counts up by itself")),
-    "count": (N_("Runs in a row"), "1"),
+    "count": (N_("Runs in a row"), _COUNT),
     "note": (N_("Note"), N_("kept with the next run")),
 }
 _FORM_COLUMNS = 5
@@ -50,7 +58,9 @@ _WIDE = {"note": 2}
 
 
 class RunBar(QFrame):
-    """Series, plan and form of the next runs; Tare, Arm, Stop, Keep.
+    """Series, plan and form of the next runs; Tare, Arm, Stop, Next.
+
+    Next is hidden while a run waits for a decision. Its key keeps the run then, as `DecisionPanel` says.
 
     `leave_form` gives the keyboard focus back to the buttons.
     """
@@ -71,7 +81,7 @@ class RunBar(QFrame):
         self._strip = PlanStrip(self._choose_series)
         self._plan = make_button(gettext("Plan"), edit_plan)
         self._fold = QToolButton()
-        self._summary = _Elided()
+        self._summary = ElidedLabel()
         self._form = RunFormFields(dispatch, leave_form)
         self._form.hide()
         self._buttons = {action: self._button(action) for action in _BUTTONS}
@@ -99,13 +109,15 @@ class RunBar(QFrame):
         """Enable the allowed actions and emphasize the primary one; `keeps` while a decision is pending."""
         for action, button in self._buttons.items():
             button.setEnabled(action in allowed)
-            is_primary = action is primary and not keeps  # the button of the decision panel is, then
-            set_property(button, "primary", "true" if is_primary else "false")
-        self._name(Action.NEXT, _KEEP if keeps else None)
+            set_property(button, "primary", "true" if action is primary else "false")
+        self._buttons[Action.NEXT].setVisible(not keeps)
 
     def show_stop(self, disarms: bool) -> None:
         """Say whether Stop keeps a run or none."""
-        self._name(Action.STOP, _DISARM if disarms else None)
+        text, key, description = _BUTTONS[Action.STOP]
+        text, description = _DISARM if disarms else (text, description)
+        self._buttons[Action.STOP].setText(f"{gettext(text)}   {key}")
+        set_button_hint(self._buttons[Action.STOP], gettext(description))
 
     def _show_summary(self) -> None:
         choices = self._shown
@@ -126,6 +138,9 @@ class RunBar(QFrame):
         text, key, description = _BUTTONS[action]
         button = make_button(f"{gettext(text)}   {key}", lambda: self._dispatch(action), large=True)
         button.setMinimumWidth(108)
+        policy = button.sizePolicy()
+        policy.setRetainSizeWhenHidden(True)  # so that no other button comes under the pointer
+        button.setSizePolicy(policy)
         if key == "Enter":
             bind_button(button, ENTER_KEYS, gettext(description), self, act=self._press_primary)
         else:
@@ -136,13 +151,6 @@ class RunBar(QFrame):
         """Press Keep or Next, or Arm where that is the usual next action."""
         following, arm = self._buttons[Action.NEXT], self._buttons[Action.ARM]
         (arm if arm.property("primary") == "true" else following).click()
-
-    def _name(self, action: Action, name: tuple[str, str] | None) -> None:
-        """Give a button another label and description for the present state; None its usual ones."""
-        text, key, description = _BUTTONS[action]
-        text, description = name or (text, description)
-        self._buttons[action].setText(f"{gettext(text)}   {key}")
-        set_button_hint(self._buttons[action], gettext(description))
 
     def _choose_series(self, series: str) -> None:
         self._dispatch(SeriesChosen(series))
@@ -164,30 +172,6 @@ class RunBar(QFrame):
         left = make_column(series, summary, spacing=4)
         row = make_row((left, 1), *self._buttons.values(), spacing=12)
         make_column(row, self._form, spacing=4, margins=(12, 8), of=self)
-
-
-class _Elided(QLabel):
-    """Line of text that is elided where it does not fit; the tool tip holds the whole text."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._text = ""
-        self.setFont(font(TextRole.TEXT))
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-
-    def set_line(self, text: str, *, is_error: bool) -> None:
-        self._text = text
-        self.setToolTip(text)
-        set_property(self, "tone", "bad" if is_error else "plain")
-        set_property(self, "role", "" if is_error else "muted")
-        self._fit()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        self.setText(self.fontMetrics().elidedText(self._text, Qt.TextElideMode.ElideRight, self.width()))
 
 
 class PlanStrip(QWidget):
@@ -271,7 +255,10 @@ class RunFormFields(QWidget):
         for number, (name, field) in enumerate(self._fields.items()):
             title_text, hint = _FORM_FIELDS[name]
             field.setAccessibleName(gettext(title_text))
-            field.setPlaceholderText(gettext(hint))
+            if hint == _COUNT:
+                show_default(field, _COUNT)
+            else:
+                field.setPlaceholderText(gettext(hint))
             field.textEdited.connect(self._emit_form)
             field.left.connect(leave)
             title = label(gettext(title_text), TextRole.LABEL, muted=True)

@@ -13,12 +13,18 @@ from PySide6.QtCore import (
     Signal,
 )
 from PySide6.QtGui import QColor, QKeyEvent
-from PySide6.QtWidgets import QAbstractItemView, QHeaderView, QTableView
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+)
 
 from app.presenters.base import Tone
 from app.presenters.runs.state import COLUMN_HINTS, USUAL_COLUMNS, Column, RunRow
 from app.qt.theme import Theme
-from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, serve_table
+from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, TitleHeader, serve_table
 from app.qt.window_geometry import persist_layout
 from messages.i18n import gettext
 
@@ -73,10 +79,10 @@ class RunsTable(QTableView):
         lines.hide()
         lines.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         lines.setDefaultSectionSize(_LINE_HEIGHT)
-        titles = self.horizontalHeader()
+        titles = TitleHeader(self)
+        self.setHorizontalHeader(titles)
         titles.setHighlightSections(False)
         titles.setStretchLastSection(True)
-        titles.setSectionsClickable(True)
         titles.setSortIndicatorShown(True)
         titles.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         persist_layout(titles, "runs")
@@ -87,6 +93,7 @@ class RunsTable(QTableView):
         titles.sortIndicatorChanged.connect(self._want_order)
         self.selectionModel().selectionChanged.connect(self._tell_selected)
         self.doubleClicked.connect(lambda _: self.open_requested.emit())
+        self.setItemDelegateForColumn(_COLUMNS.index(Column.NOTE), _NoteDelegate(self))
         theme.changed.connect(self.viewport().update)
 
     def show_rows(self, rows: tuple[RunRow, ...], selected: tuple[str, ...]) -> None:
@@ -135,6 +142,14 @@ class RunsTable(QTableView):
     def _selected_paths(self) -> tuple[str, ...]:
         numbers = sorted(index.row() for index in self.selectionModel().selectedRows())
         return tuple(self._model.rows[number].path for number in numbers)
+
+
+class _NoteDelegate(QStyledItemDelegate):
+    """Elides a note at its end: it is read from its beginning."""
+
+    def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:  # noqa: N802
+        super().initStyleOption(option, index)
+        option.textElideMode = Qt.TextElideMode.ElideRight
 
 
 class _Model(QAbstractTableModel):

@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.presenters.base import Progress
+from app.qt.theme import set_property
 from messages.i18n import gettext
 
 _MARK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.30))  # corners of the mark, in parts of the box
@@ -161,6 +162,12 @@ def show_texts(fields: Mapping[str, QLineEdit], form: object) -> None:
     for name, field in fields.items():
         if field.text() != getattr(form, name):
             field.setText(getattr(form, name))
+
+
+def show_default(field: QLineEdit, text: str) -> None:
+    """Show in an empty field the value that is used then, in the colour of values: examples are grey."""
+    field.setPlaceholderText(text)
+    set_property(field, "shows", "default")
 
 
 def make_fields(texts: Mapping[str, tuple[str, str]], edited: Callable[[], object]) -> dict[str, QLineEdit]:

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import partial
 
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QGuiApplication, QKeySequence
-from PySide6.QtWidgets import QHeaderView, QMenu, QTableView
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtGui import QGuiApplication, QKeySequence, QPainter, QPalette, QTextDocument
+from PySide6.QtWidgets import QHeaderView, QMenu, QStyle, QStyleOptionHeader, QTableView
 
 from analysis.formatting import MINUS, THIN_SPACE
 from app.qt.widgets.shortcuts import add_shortcut
+from app.qt.widgets.text import set_subscripts
 from messages.i18n import gettext
 
 NAME_ROLE = Qt.ItemDataRole.UserRole + 10
@@ -16,6 +17,47 @@ NAME_ROLE = Qt.ItemDataRole.UserRole + 10
 COPIED_ROLE = Qt.ItemDataRole.UserRole + 11
 """Of a cell and of a title: texts for a spreadsheet, a column each; without it the shown text is copied."""
 _ACROSS = Qt.Orientation.Horizontal
+
+
+class TitleHeader(QHeaderView):
+    """Titles of columns, symbols such as `f_d` set with their subscripts."""
+
+    def __init__(self, table: QTableView) -> None:
+        super().__init__(_ACROSS, table)
+        self.setSectionsClickable(True)  # as the header that a table makes for itself
+
+    def paintSection(self, painter: QPainter, rect: QRect, section: int) -> None:  # noqa: N802
+        title = str(self.model().headerData(section, _ACROSS))
+        rich = set_subscripts(title)
+        if rich == title:
+            super().paintSection(painter, rect, section)
+            return
+        option = QStyleOptionHeader()
+        self.initStyleOption(option)
+        option.rect, option.section = rect, section
+        self.initStyleOptionForIndex(option, section)
+        option.text = ""
+        painter.save()
+        self.style().drawControl(QStyle.ControlElement.CE_Header, option, painter, self)
+        place = self.style().subElementRect(QStyle.SubElement.SE_HeaderLabel, option, self)
+        side = self.model().headerData(section, _ACROSS, Qt.ItemDataRole.TextAlignmentRole)
+        _draw_rich(painter, place, rich, self, side or self.defaultAlignment())
+        painter.restore()
+
+
+def _draw_rich(painter: QPainter, place: QRect, rich: str, of: QHeaderView, side: Qt.AlignmentFlag) -> None:
+    document = QTextDocument()
+    document.setDocumentMargin(0)
+    document.setDefaultFont(of.font())
+    colour = of.palette().color(QPalette.ColorRole.ButtonText).name()
+    lines = rich.replace("\n", "<br>")
+    document.setHtml(
+        f'<div align="{"right" if side & Qt.AlignmentFlag.AlignRight else "left"}">'
+        f'<font color="{colour}">{lines}</font></div>'
+    )
+    document.setTextWidth(place.width())
+    painter.translate(place.left(), place.top() + (place.height() - document.size().height()) / 2)
+    document.drawContents(painter)
 
 
 def serve_table(

@@ -7,7 +7,15 @@ from typing import TypeVar
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QResizeEvent, QTextDocumentFragment
-from PySide6.QtWidgets import QBoxLayout, QGridLayout, QHBoxLayout, QLabel, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Tone
 from app.presenters.results import ResultRow
@@ -92,6 +100,30 @@ def symbol_text(rich: str) -> str:
 def break_path(path: str) -> str:
     """Let a long path wrap at its separators."""
     return path.replace("/", "/\u200b").replace("\\", "\\\u200b")
+
+
+class ElidedLabel(QLabel):
+    """Muted line that is elided where it does not fit; the tool tip holds the whole text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._text = ""
+        self.setFont(font(TextRole.TEXT))
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+
+    def set_line(self, text: str, *, is_error: bool = False) -> None:
+        self._text = text
+        self.setToolTip(text)
+        set_property(self, "tone", "bad" if is_error else "plain")
+        set_property(self, "role", "" if is_error else "muted")
+        self._fit()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        self.setText(self.fontMetrics().elidedText(self._text, Qt.TextElideMode.ElideRight, self.width()))
 
 
 class ValueLabel(QWidget):

@@ -21,7 +21,7 @@ def test_a_sound_gauge_in_figures() -> None:
     assert figures["reading"] == "1.000\u202fmm"
     assert figures["noise, rms"] == "12.1\u202fµm"
     assert figures["hum, 50 Hz"] == "none seen"
-    assert figures["range used"] == "6%"
+    assert figures["range used"] == "6\u202f%"
     assert len(state.frequency_hz) == len(state.density_um) == 501
 
 

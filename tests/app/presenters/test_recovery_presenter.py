@@ -69,7 +69,7 @@ def test_it_asks_at_the_start_and_recovers_when_told_to(desk: Desk) -> None:
     assert (call.name, call.arguments) == ("recover_runs", (str(bench().directory),))
     assert desk.notice.action is None
     call.progress(Progress("Recovering x", 0.4))
-    assert desk.notice.text == "Recovering x: 40%"
+    assert desk.notice.text == "Recovering x: 40\u202f%"
     call.done(RecoveryReport(runs=("/r/a.h5", "/r/b.h5")))
     assert (desk.notice.text, desk.notice.tone) == ("Recovered 2 runs", Tone.OK)
 

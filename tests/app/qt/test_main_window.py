@@ -247,7 +247,7 @@ def test_the_window_speaks_russian(
         Screen.IDENTIFY: "Здесь запись сравнивается с расчётом",
         Screen.RUNS: "Просмотр папки",
         Screen.GAUGES: "Датчик 1, стол",
-        Screen.STAND: "Настройка стенда",
+        Screen.STAND: "Настройка модели стенда",
         Screen.SETTINGS: "Папка записей",
     }
     for screen, words in expected.items():

@@ -219,6 +219,14 @@ def test_one_button_alone_is_brought_out_while_a_run_is_decided_about(stage: Sta
     assert [b.text() for b in shown if b.property("primary") == "true"] == ["Keep\nEnter"]
 
 
+def test_keep_is_said_once_and_no_button_moves_meanwhile(stage: Stage) -> None:
+    places = {text: stage.button(text).pos() for text in ("Tare   T", "Arm   A", "Stop   Esc")}
+    stage.record()
+    shown = [button.text() for button in stage.screen.findChildren(QPushButton) if button.isVisible()]
+    assert [text for text in shown if "Enter" in text] == ["Keep\nEnter"]
+    assert places == {text: stage.button(text).pos() for text in places}
+
+
 def test_n_writes_a_note_and_escape_leaves_it_to_the_single_keys(stage: Stage) -> None:
     stage.record()
     stage.press(Qt.Key.Key_N)

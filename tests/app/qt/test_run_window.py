@@ -14,6 +14,14 @@ from app.qt.main import run_window
 threading.Timer(1.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 sys.exit(run_window())
 """
+INTERRUPTED_EARLY = """
+import os, signal, sys
+from app.qt.main import run_window
+from app.qt.window import MainWindow
+show = MainWindow.show
+MainWindow.show = lambda window: (show(window), os.kill(os.getpid(), signal.SIGINT))
+sys.exit(run_window())
+"""
 NOWHERE = {"QT_QPA_PLATFORM": None, "DISPLAY": None, "WAYLAND_DISPLAY": None}
 REFUSED = """
 import sys
@@ -34,10 +42,11 @@ def run(code: str, **changes: str | None) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process cannot send itself Ctrl-C there")
-def test_the_window_opens_and_closes_on_ctrl_c_and_keeps_how_it_was_left(tmp_path: Path) -> None:
+@pytest.mark.parametrize("code", [WINDOW, INTERRUPTED_EARLY], ids=["open", "opening"])
+def test_the_window_opens_and_closes_on_ctrl_c_and_keeps_how_it_was_left(code: str, tmp_path: Path) -> None:
     (tmp_path / "window.toml").write_text('screen = "settings"\nwidth = 1100\nheight = 700\n')
     (tmp_path / "settings.toml").write_text('theme = "dark"\nlanguage = "ru"\n')
-    result = run(WINDOW, SLIPSTAND_CONFIG=str(tmp_path))
+    result = run(code, SLIPSTAND_CONFIG=str(tmp_path))
     assert result.returncode == 130, result.stderr
     assert "Traceback" not in result.stderr
     left = tomllib.loads((tmp_path / "window.toml").read_text(encoding="utf-8"))

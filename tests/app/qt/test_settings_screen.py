@@ -55,7 +55,7 @@ def page(qtbot: QtBot) -> Page:
     [
         ("Theme", "Dark", "theme", "dark"),
         ("Language", "Русский", "language", "ru"),
-        ("Size", "150%", "scale", 1.5),
+        ("Size", "150\u202f%", "scale", 1.5),
     ],
 )
 def test_a_choice_holds(page: Page, name: str, words: str, field: str, value: object) -> None:

@@ -1,8 +1,8 @@
 """Rows copied for a spreadsheet, and columns chosen, moved and remembered, by keys and mouse."""
 
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QContextMenuEvent, QGuiApplication
+from PySide6.QtCore import QPoint, QRect, Qt
+from PySide6.QtGui import QContextMenuEvent, QGuiApplication, QImage
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
@@ -14,7 +14,14 @@ from PySide6.QtWidgets import (
 )
 from pytestqt.qtbot import QtBot
 
-from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, serve_table, show_columns, shown_columns
+from app.qt.widgets.tables import (
+    COPIED_ROLE,
+    NAME_ROLE,
+    TitleHeader,
+    serve_table,
+    show_columns,
+    shown_columns,
+)
 from app.qt.window_geometry import WindowGeometry, persist_layout
 from config.schema import WindowLayout
 
@@ -112,6 +119,27 @@ def test_the_last_column_stays(table: QTableWidget) -> None:
     enabled = {action.text(): action.isEnabled() for action in menu.actions() if action.isCheckable()}
     assert [text for text, is_enabled in enabled.items() if not is_enabled] == ["Note"]
     assert not next(action for action in menu.actions() if action.text() == "Copy rows").isEnabled()
+
+
+def test_symbols_of_titles_have_their_subscripts(table: QTableWidget, qtbot: QtBot) -> None:
+    """The letters behind the mark of a subscript are drawn smaller and lower: the title is narrower."""
+    header = TitleHeader(table)
+    table.setHorizontalHeader(header)
+    table.setColumnWidth(1, 120)
+    table.show()
+    place = QRect(header.sectionViewportPosition(1) + 1, 1, 110, header.height() - 3)
+    symbol = inked_width(header.grab(place).toImage())
+    table.horizontalHeaderItem(1).setText("fd")
+    plain = inked_width(header.grab(place).toImage())
+    assert 0 < symbol < plain
+
+
+def inked_width(image: QImage) -> int:
+    ground = image.pixel(0, 0)
+    columns = [
+        x for x in range(image.width()) if any(image.pixel(x, y) != ground for y in range(image.height()))
+    ]
+    return columns[-1] - columns[0] if columns else 0
 
 
 def test_a_title_is_dragged_to_another_place(table: QTableWidget, qtbot: QtBot) -> None:
