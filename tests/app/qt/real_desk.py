@@ -112,11 +112,9 @@ class Desk:
         return self.wait(lambda: self._found(text, kind, enabled), f"{kind} {text!r}")
 
     def _found(self, text: str, kind: str, enabled: bool) -> Shown | None:
-        for one in self.look():
-            is_meant = one["name"] == text or one["text"].startswith(text)
-            if kind in one["kind"] and is_meant and one["enabled"] >= enabled:
-                return one
-        return None
+        likely = [one for one in self.look() if kind in one["kind"] and one["enabled"] >= enabled]
+        exact = (one for one in likely if text in (one["name"], one["text"]))
+        return next(exact, next((one for one in likely if one["text"].startswith(text)), None))
 
     def button(self, text: str) -> Shown:
         return self.find(text, "QAbstractButton")
