@@ -122,6 +122,16 @@ class Desk:
     def focused(self) -> Shown | None:
         return next((one for one in self.look() if one["focused"]), None)
 
+    def wait_for_field(self, window: str) -> None:
+        """Wait until a field of an active window of this kind takes what is written."""
+
+        def is_ready() -> bool:
+            shown, focused = self.look(), self.focused()
+            is_active = any(window in one["kind"] and one["is_active"] for one in shown)
+            return is_active and focused is not None and "QLineEdit" in focused["kind"]
+
+        self.wait(is_ready, f"a field of {window}")
+
     def plots(self) -> list[Shown]:
         """Plots of the largest stack that is shown."""
         stacks = [one for one in self.look() if one.get("plots")]

@@ -119,7 +119,7 @@ def first_result(desk: Desk, home: Path) -> Path:
 def decide(desk: Desk, first: Path) -> None:
     """Plan two tests; keep with a note, take it back, discard, and take that back by a click."""
     desk.press("p")
-    desk.find("Simulated runs count", "QCheckBox")
+    desk.wait_for_field("QDialog")
     desk.write("1FFM0 x2")
     desk.press("Return")
     desk.click("Simulated runs count")
@@ -257,7 +257,7 @@ def review(desk: Desk, first: Path, home: Path) -> None:
     desk.wait_for("Coulomb")
     desk.click("Export")
     desk.choose("Report as PDF…")
-    desk.find("", "QFileDialog")
+    desk.wait_for_field("QFileDialog")
     desk.press("Return")
     report = first.with_suffix(".pdf")
     desk.wait_for(f"Wrote {report}")
