@@ -112,17 +112,25 @@ class Desk:
         return self.wait(lambda: self._found(text, kind, enabled), f"{kind} {text!r}")
 
     def _found(self, text: str, kind: str, enabled: bool) -> Shown | None:
-        for one in self.look():
-            is_meant = one["name"] == text or one["text"].startswith(text)
-            if kind in one["kind"] and is_meant and one["enabled"] >= enabled:
-                return one
-        return None
+        likely = [one for one in self.look() if kind in one["kind"] and one["enabled"] >= enabled]
+        exact = (one for one in likely if text in (one["name"], one["text"]))
+        return next(exact, next((one for one in likely if one["text"].startswith(text)), None))
 
     def button(self, text: str) -> Shown:
         return self.find(text, "QAbstractButton")
 
     def focused(self) -> Shown | None:
         return next((one for one in self.look() if one["focused"]), None)
+
+    def wait_for_field(self, window: str) -> None:
+        """Wait until a field of an active window of this kind takes what is written."""
+
+        def is_ready() -> bool:
+            shown, focused = self.look(), self.focused()
+            is_active = any(window in one["kind"] and one["is_active"] for one in shown)
+            return is_active and focused is not None and "QLineEdit" in focused["kind"]
+
+        self.wait(is_ready, f"a field of {window}")
 
     def plots(self) -> list[Shown]:
         """Plots of the largest stack that is shown."""

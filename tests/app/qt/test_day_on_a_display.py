@@ -76,18 +76,15 @@ def amplifier(home: Path) -> Iterator[Amplifier]:
 
 
 def test_a_day_in_the_program(home: Path, amplifier: Amplifier) -> None:
-    with window_system(home) as environment:
-        with program(environment, home) as desk:
-            first = first_result(desk, home)
-            decide(desk, first)
-            look_closely(desk)
-            pull_by_hand(desk, amplifier, home)
-            lose(desk, amplifier)
-            review(desk, first, home)
-            bring_a_file(desk, home)
-            close_while_recording(desk, home)
-        with program(environment, home) as desk:
-            begin_again(desk, first)
+    with window_system(home) as environment, program(environment, home) as desk:
+        first = first_result(desk, home)
+        decide(desk, first)
+        look_closely(desk)
+        pull_by_hand(desk, amplifier, home)
+        lose(desk, amplifier)
+        review(desk, first, home)
+        desk.press("ctrl+q")
+        assert desk.process.wait(30.0) == 0
 
 
 def runs_of(home: Path) -> list[Path]:
@@ -122,7 +119,7 @@ def first_result(desk: Desk, home: Path) -> Path:
 def decide(desk: Desk, first: Path) -> None:
     """Plan two tests; keep with a note, take it back, discard, and take that back by a click."""
     desk.press("p")
-    desk.find("Simulated runs count", "QCheckBox")
+    desk.wait_for_field("QDialog")
     desk.write("1FFM0 x2")
     desk.press("Return")
     desk.click("Simulated runs count")
@@ -260,61 +257,12 @@ def review(desk: Desk, first: Path, home: Path) -> None:
     desk.wait_for("Coulomb")
     desk.click("Export")
     desk.choose("Report as PDF…")
-    desk.find("", "QFileDialog")
+    desk.wait_for_field("QFileDialog")
     desk.press("Return")
     report = first.with_suffix(".pdf")
     desk.wait_for(f"Wrote {report}")
     assert report.read_bytes().startswith(b"%PDF")
     assert "QAbstractButton" not in desk.focused()["kind"], "Enter would press what nobody chose"
-
-
-def bring_a_file(desk: Desk, home: Path) -> None:
-    """Import a text in UTF-16 with a decimal comma, units below the names, and empty last columns."""
-    source = open_run(runs_of(home)[0], trusted=True)
-    seconds, table = source.time_s[:12000:4], source.table_m[:12000:4]
-    lines = ["Zeit;Tisch;Platte;;", "s;mm;mm;;"]
-    lines += [
-        f"{t:.4f};{u * 1e3:.5f};{v * 1e3:.5f};;".replace(".", ",")
-        for t, u, v in zip(seconds, table, source.relative_m[:12000:4], strict=True)
-    ]
-    text = home / "odd.csv"
-    text.write_text("\n".join(lines), encoding="utf-16")
-    screen(desk, 4)
-    desk.press("ctrl+i")
-    desk.find("", "QFileDialog")
-    desk.write(str(text))
-    desk.press("Return")
-    desk.wait_for("Zeit;Tisch;Platte")
-    desk.click("Import")
-    desk.wait(lambda: len(runs_of(home)) == 3, "the imported run")
-    desk.press("Escape")
-
-
-def close_while_recording(desk: Desk, home: Path) -> None:
-    """Closing the window by the window manager asks, and what is recorded becomes a run."""
-    screen(desk, 1)
-    desk.click("Try with the simulated stand")
-    desk.wait(lambda: desk.button("Arm")["primary"], "a stand that is ready")
-    desk.click("Arm")
-    desk.wait_for("The plate slides")
-    desk.press("alt+F4")
-    desk.wait_for("Closing the window")
-    desk.press("Return")
-    desk.wait_until_gone("Closing the window")
-    desk.press("alt+F4")
-    desk.click("Close the window")
-    assert desk.process.wait(30.0) == 0
-    assert len(runs_of(home)) == 4
-
-
-def begin_again(desk: Desk, first: Path) -> None:
-    """The next start offers the last device and recent runs, and a run is opened by a click."""
-    screen(desk, 1)
-    assert desk.button("Connect again")["primary"]
-    desk.click(f"Open {first.stem}")
-    desk.wait(lambda: desk.title().startswith(f"{first.stem} "), "the run in the title")
-    desk.press("ctrl+q")
-    assert desk.process.wait(30.0) == 0
 
 
 def changed(desk: Desk, before: dict) -> dict | None:
