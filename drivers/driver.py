@@ -1,6 +1,6 @@
 """Description of a device folder, whose modules are imported when they are used."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from drivers.stream import SampleSource
 
 UNVERIFIED = N_("not verified on hardware")
-RESERVED = "reserved, comes later"
+RESERVED = N_("reserved, comes later")
 GAUGES = ("table", "relative")
 
 
@@ -47,7 +47,8 @@ class DeviceDriver:
     """Place in lists of devices; by how often the device is used."""
     default_baud: int = 0  # 0 where none is usual
     channels: int = 2  # gauges on one port
-    verified: str = RESERVED  # what it was tested against
+    evidence: str = ""  # what it was tested against, beside hardware
+    on_hardware: bool = False  # whether it was tested on the device itself
     package: str = ""  # the folder as a package (`__name__`); "" for a name that is only reserved
     format_bauds: Mapping[str, int] = field(default_factory=dict)
     """Usual baud rates of a device that is chosen by its setting `format`."""
@@ -56,6 +57,18 @@ class DeviceDriver:
     simulated_gauges: str = ""
     """Settings file with the calibration of its simulated device; "" for the one in use."""
     has_single_gauge_settings: bool = False  # whether it can be set to one gauge of two
+
+    @property
+    def verified(self) -> str:
+        """What it was tested against, in English."""
+        return self.say_verified(str)
+
+    def say_verified(self, translate: Callable[[str], str]) -> str:
+        """What it was tested against, each part rendered by `translate`."""
+        if not self.available:
+            return translate(RESERVED)
+        parts = ("" if self.on_hardware else UNVERIFIED, self.evidence)
+        return "; ".join(translate(part) for part in parts if part)
 
     @property
     def available(self) -> bool:

@@ -64,7 +64,7 @@ class StandScreen(QWidget):
         self._series.setCurrentText(state.form.series)
         show_texts(self._fields, state.form)
         for name, field in self._fields.items():
-            show_default(field, getattr(state.defaults, name))
+            show_default(field, getattr(state.defaults, name) or gettext("none"))
         show_texts({"fault_duration_s": self._seconds}, state)
         set_property(self._start, "primary", "false" if state.is_running else "true")
         show_chip(self._message, state.message)
@@ -102,7 +102,6 @@ class StandScreen(QWidget):
             _add(grid, line, gettext(_FIELDS[name][0]), field, gettext(_FIELDS[name][1]))
         effects = self._fields["effects"]
         effects.setToolTip("\n".join((effects.toolTip(), *LISTED)))
-        show_default(effects, gettext("none"))
         hint = gettext("Empty a field for its usual value.")
         return _card(gettext("Set up the simulated stand"), hint, grid, self._start, self._message)
 

@@ -25,7 +25,6 @@ from app.qt.widgets.layouts import (
 )
 from app.qt.widgets.shortcuts import ENTER_KEYS, add_shortcut, bind_button
 from app.qt.widgets.text import break_path, label, padded, set_text_or_hide, show_chip
-from drivers.driver import UNVERIFIED
 from messages.i18n import N_, gettext
 
 _CARD_WIDTHS, _CARD_HEIGHT = (256, 296), 344
@@ -77,8 +76,7 @@ class StartScreen(QWidget):
             self._series.addItems(state.all_series)
         self._series.setCurrentText(state.series)
         self._form.show_form(state)
-        verified = state.selected_protocol.verified if state.selected_protocol else ""
-        verified = verified.replace(UNVERIFIED, gettext(UNVERIFIED))
+        verified = state.selected_protocol.say_verified(gettext) if state.selected_protocol else ""
         self._verified.setText(verified[:1].upper() + verified[1:])
         show_chip(self._error, Chip(state.form_error, Tone.BAD))
         self._folder.setText(gettext("Runs are stored in {folder}", folder=break_path(state.recordings)))

@@ -7,7 +7,6 @@ from analysis.formatting import with_unit
 from app.presenters.base import EMPTY_CHIP, Chip, Progress, ReportProgress, Tone
 from app.presenters.gauges.state import PortCard
 from app.presenters.navigator import ConnectForm
-from drivers.driver import UNVERIFIED
 from drivers.host_checks import usb_chip_name
 from drivers.port import PortInfo, list_ports, list_streams
 from drivers.port_probe import PortReport, ProbeOutcome, probe_port
@@ -71,13 +70,12 @@ def probed_port(report: PortReport) -> PortCard:
         line = report.line_settings
         frame = f"8{line.parity}{line.stop_bits}"
         title = gettext("{title} at {baud} baud {frame}", title=title, baud=line.baud, frame=frame)
-    verified = info.verified.replace(UNVERIFIED, gettext(UNVERIFIED))
     remark = (translate(replace_options(found.remark, _LABELS)),) if found.remark else ()
     return replace(
         card,
         status=Chip(title, Tone.OK, gettext("Protocol {protocol}", protocol=found.protocol)),
         description=(
-            f"{_signal(found)}; {verified}",
+            f"{_signal(found)}; {info.say_verified(gettext)}",
             *remark,
             *hints,
         ),

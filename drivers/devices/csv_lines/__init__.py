@@ -1,6 +1,6 @@
 """Lines of values, as Arduinos and loggers send them."""
 
-from drivers.driver import UNVERIFIED, DeviceDriver
+from drivers.driver import DeviceDriver
 from messages.i18n import N_
 
 DRIVER = DeviceDriver(
@@ -8,7 +8,7 @@ DRIVER = DeviceDriver(
     title=N_("CSV lines (Arduino, HX711, ADS1256, OpenScale, loggers)"),
     rank=20,
     default_baud=115200,
-    verified=f"{UNVERIFIED}; presets read the examples of manuals, PyVISA 1.16 the simulated multimeter",
+    evidence=N_("presets read the examples of manuals, PyVISA 1.16 the simulated multimeter"),
     package=__name__,
     format_bauds={
         "openscale": 9600,

@@ -1,6 +1,6 @@
 """Scaime eNod4 that sends by itself, in the fast SCMBus protocol."""
 
-from drivers.driver import UNVERIFIED, DeviceDriver
+from drivers.driver import DeviceDriver
 from messages.i18n import N_
 
 DRIVER = DeviceDriver(
@@ -9,7 +9,7 @@ DRIVER = DeviceDriver(
     rank=70,
     default_baud=115200,
     channels=1,
-    verified=f"{UNVERIFIED}, no peer; frames are written as the manual describes them",
+    evidence=N_("no peer; frames are written as the manual describes them"),
     package=__name__,
     frames_title=N_("fast SCMBus frames"),
     simulated_rate_hz=500.0,

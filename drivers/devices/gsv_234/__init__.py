@@ -1,6 +1,6 @@
 """ME-Systeme GSV-4, GSV-3 and GSV-2, the bridge amplifiers before the GSV-6."""
 
-from drivers.driver import UNVERIFIED, DeviceDriver
+from drivers.driver import DeviceDriver
 from messages.i18n import N_
 
 DRIVER = DeviceDriver(
@@ -8,7 +8,7 @@ DRIVER = DeviceDriver(
     title=N_("ME-Systeme GSV-4, GSV-3 and GSV-2 (the latter two with one channel)"),
     rank=35,
     default_baud=115200,
-    verified=f"{UNVERIFIED}, no peer; the manuals' examples and the bytes of the vendor's scripts are read",
+    evidence=N_("no peer; the manuals' examples and the bytes of the vendor's scripts are read"),
     package=__name__,
     format_bauds={"gsv-3": 38400, "gsv-2": 38400},
     frames_title=N_("frames of a GSV-2, 3 or 4"),

@@ -1,6 +1,6 @@
 """HBM/HBK AED and FIT, transducer electronics and digital load cells with one channel."""
 
-from drivers.driver import UNVERIFIED, DeviceDriver
+from drivers.driver import DeviceDriver
 from messages.i18n import N_
 
 DRIVER = DeviceDriver(
@@ -9,7 +9,7 @@ DRIVER = DeviceDriver(
     rank=60,
     default_baud=9600,
     channels=1,
-    verified=f"{UNVERIFIED}, no peer; commands, answers and formats are those of the maker's AD104 manual",
+    evidence=N_("no peer; commands, answers and formats are those of the maker's AD104 manual"),
     package=__name__,
     frames_title=N_("binary values of an AED or FIT"),
     simulated_rate_hz=600.0,

@@ -1,6 +1,6 @@
 """The Slipstand binary protocol of any microcontroller with the reference firmware (`firmware/`)."""
 
-from drivers.driver import UNVERIFIED, DeviceDriver
+from drivers.driver import DeviceDriver
 from messages.i18n import N_
 
 DRIVER = DeviceDriver(
@@ -8,7 +8,7 @@ DRIVER = DeviceDriver(
     title=N_("Slipstand binary (microcontroller with the reference firmware)"),
     rank=10,
     default_baud=460800,
-    verified=f"{UNVERIFIED}; the reference firmware is read in simavr, an AVR simulator",
+    evidence=N_("the reference firmware is read in simavr, an AVR simulator"),
     package=__name__,
     frames_title=N_("Slipstand frames"),
 )

@@ -104,7 +104,7 @@ def test_ports_are_looked_for_when_asked(presenter: StartPresenter) -> None:
 
 
 def test_what_is_known_of_the_chosen_protocol(doors: FakeDoors) -> None:
-    csv = DeviceDriver("csv", "Lines", 1, 115200, verified="not verified on hardware")
+    csv = DeviceDriver("csv", "Lines", 1, 115200)
     state = StartState(all_series=(), series="", protocols=(csv,))
     presenter = StartPresenter(state, doors, tuple)
     assert presenter.state.selected_protocol is None

@@ -72,7 +72,7 @@ def test_ports_are_offered_and_the_usual_baud_is_shown(desk: Desk) -> None:
     assert [port.itemText(i) for i in range(port.count())] == ["COM7"]
     assert desk.field("Baud").placeholderText() == "460800"
     shown = [text.text() for text in desk.window.findChildren(QLabel) if text.isVisible()]
-    assert "Not verified on a GSV" in shown
+    assert "Not verified on hardware; its manual" in shown
 
 
 def test_an_error_stands_above_the_screen_until_dismissed(desk: Desk) -> None:

@@ -42,7 +42,7 @@ class Desk:
             all_series=bench().all_series,
             series="1FFM0",
             protocols=(
-                DeviceDriver("slipstand-binary", "", 1, 460800, verified="not verified on a GSV"),
+                DeviceDriver("slipstand-binary", "", 1, 460800, evidence="its manual", package="drivers"),
                 DeviceDriver("csv", "", 2, 115200),
             ),
             form=ConnectForm(protocol="slipstand-binary"),
