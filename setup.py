@@ -7,6 +7,8 @@ installation leaves everything as it is.
 """
 
 import ast
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -18,7 +20,7 @@ DATA = {
     "config": ["*.toml", "*.csv", "udev/*.rules"],
     "messages": ["locale/*/LC_MESSAGES/*.mo"],
     "drivers": ["devices/modbus/maps/*.toml", "devices/csv_lines/presets/*.toml"],
-    "app": ["qt/*.qss", "reports/figures/*.mplstyle", "reports/test_report/*.typ"],
+    "app": ["commit.txt", "qt/*.qss", "qt/*.svg", "reports/figures/*.mplstyle", "reports/test_report/*.typ"],
 }
 ROOT = Path(__file__).parent
 IS_EDITABLE = "editable_wheel" in sys.argv
@@ -81,6 +83,23 @@ class BuildPackages(build_py):
             path.chmod(0o644)
             path.write_text(rewrite(Path(module_file).read_text("utf-8"), module_file), encoding="utf-8")
         return target, copied
+
+    def build_package_data(self) -> None:
+        """Copy the data, and write the commit that the package is made of."""
+        super().build_package_data()
+        if not IS_EDITABLE and (commit := built_commit()):
+            Path(self.build_lib, "slipstand", "app", "commit.txt").write_text(f"{commit}\n", encoding="utf-8")
+
+
+def built_commit() -> str:
+    """SLIPSTAND_COMMIT, else the commit of the checkout; "" for an archive of sources, which has its own."""
+    if "SLIPSTAND_COMMIT" in os.environ or not (ROOT / ".git").exists():
+        return os.environ.get("SLIPSTAND_COMMIT", "")
+    described = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude=*", "--abbrev=12"]
+    try:
+        return subprocess.run(described, capture_output=True, text=True, check=True).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return ""
 
 
 def build() -> None:

@@ -28,17 +28,22 @@ def _run() -> None:
     if getattr(sys, "frozen", False):
         arguments = _run_if_child(arguments)
     if arguments == ["--version"]:
-        from app.version import __version__
+        from app.version import version_text
 
-        sys.stdout.write(f"slipstand {__version__}\n")
-    elif arguments in ([], ["--simulated"]):
+        sys.stdout.write(f"slipstand {version_text()}\n")
+    elif arguments in ([], ["--simulated"]) or _is_run(arguments):
         from app.qt.main import run_window
 
-        sys.exit(run_window(simulated=bool(arguments)))
+        sys.exit(run_window("--simulated" in arguments, arguments[0] if _is_run(arguments) else None))
     else:
         from app.cli import run
 
         run()
+
+
+def _is_run(arguments: list[str]) -> bool:
+    """Tell whether the only argument is a run file, as when one is opened in a file manager."""
+    return len(arguments) == 1 and arguments[0].lower().endswith(".h5") and os.path.isfile(arguments[0])  # noqa: PTH113 - pathlib takes a while to load
 
 
 def _run_if_child(arguments: list[str]) -> list[str]:

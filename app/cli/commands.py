@@ -8,7 +8,7 @@ from typer.core import TyperGroup
 
 from app.cli.options import command_function
 from app.log import start_log
-from app.version import __version__
+from app.version import version_text
 
 _EXAMPLES = {
     "record:record": "record --port /dev/ttyUSB0 --protocol csv --series 1FFM0",
@@ -121,7 +121,8 @@ def _typer(**settings: Any) -> typer.Typer:
 app = _typer(
     cls=SlipstandGroup,
     help="Measures dry friction on a shaking stand. "
-    "`slipstand` alone opens the window, `slipstand --simulated` opens it on the simulated stand.",
+    "`slipstand` alone opens the window, `slipstand --simulated` opens it on the simulated stand, "
+    "`slipstand FILE.h5` on a run.",
 )
 app.add_typer(
     _typer(cls=DeviceGroup, help="Devices, ports and the simulated stand.", no_args_is_help=True),
@@ -131,14 +132,15 @@ app.add_typer(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"slipstand {__version__}")
+        typer.echo(f"slipstand {version_text()}")
         raise typer.Exit
 
 
 @app.callback()
 def main_options(
     version: Annotated[  # noqa: ARG001 - its callback shows it
-        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version.")
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and commit."),
     ] = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Write the log in detail, and to stderr as well.")

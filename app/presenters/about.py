@@ -9,7 +9,7 @@ from pathlib import Path
 
 import config
 from app.log import log_folder
-from app.version import __version__
+from app.version import version_text
 from config.files import is_checkout
 
 PACKAGE = "slipstand"
@@ -28,7 +28,7 @@ class Component:
 
 def components() -> tuple[Component, ...]:
     """The program, Python, and the libraries of an installation, with their licences."""
-    ours = Component("Slipstand", __version__, _licence(PACKAGE) or "MIT")
+    ours = Component("Slipstand", version_text(), _licence(PACKAGE) or "MIT")
     python = Component("Python", platform.python_version(), "PSF-2.0")
     return ours, python, *_libraries()
 

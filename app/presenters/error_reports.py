@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from app.acquisition.errors import AcquisitionError
-from app.version import __version__
+from app.version import version_text
 from config.schema import ConfigError
 from messages.message import EMPTY, Message, MessageError, message, message_of
 
@@ -72,7 +72,7 @@ def error_report(error: Exception) -> ErrorReport:
             fault=f"{name}: {text}" if text else name,
         )
     trace = "".join(traceback.format_exception(error)).strip()
-    about = f"Slipstand {__version__}, Python {platform.python_version()}, {platform.platform()}"
+    about = f"Slipstand {version_text()}, Python {platform.python_version()}, {platform.platform()}"
     return ErrorReport(shown, f"{about}\n{trace}")
 
 

@@ -4,8 +4,11 @@ import datetime
 import os
 import signal
 import sys
+from collections.abc import Callable
+from pathlib import Path
 
 from PySide6.QtCore import QLibraryInfo, QLocale, QTimer, QTranslator
+from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication, QMessageBox
 
 from analysis.catalogue import DISPLACEMENT_UNITS, use_displacement_unit
@@ -23,13 +26,14 @@ from messages.i18n import LANGUAGE_VARIABLE, language, translate, use_language
 _WARM_UP_MS = 2000
 """Delay before the analysis is loaded: engine and simulated stand, needed earlier, start first."""
 _INTERRUPTED = 130
+_ICON = Path(__file__).with_name("slipstand.svg")
 
 
-def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
+def run_window(simulated: bool = False, run: str | None = None, series: str = "1FFM0") -> int:
     """Open the window, and return the exit code when it has been closed.
 
     0 closed; 1 could not open, with one line on stderr; 130 closed by Ctrl-C or SIGTERM. With `simulated` it
-    connects at once to a simulated stand that runs `series`.
+    connects at once to a simulated stand that runs `series`; it opens `run`, the path of a run file.
     """
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
@@ -39,6 +43,8 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
     _use(personal.settings)
     app = QApplication(sys.argv[:1])
     app.setApplicationName("Slipstand")
+    app.setDesktopFileName("slipstand")  # by which a desktop finds the icon of a window
+    app.setWindowIcon(QIcon(str(_ICON)))
     _translate_dialogs(app)
     theme = Theme(app, SCHEMES[personal.settings.theme])
     try:
@@ -48,7 +54,7 @@ def run_window(simulated: bool = False, series: str = "1FFM0") -> int:
         return _refuse(str(error))
     window = MainWindow(theme, presenter, _load_layout(errors))
     window.closed.connect(lambda layout: _save_layout(layout, errors))
-    code = _run(app, window, presenter, series if simulated else None)
+    code = _run(app, window, presenter, _first_screen(window, presenter, series if simulated else None, run))
     while (late := errors.next_report()) is not None:
         sys.stderr.write(f"error: {translate(late.message)}\n")
     return code
@@ -87,14 +93,30 @@ def _save_layout(layout: WindowLayout, errors: ErrorReporter) -> None:
         errors.report(error_report(error))
 
 
-def _run(app: QApplication, window: MainWindow, presenter: WindowPresenter, simulated: str | None) -> int:
+def _first_screen(
+    window: MainWindow, presenter: WindowPresenter, simulated: str | None, run: str | None
+) -> Callable[[], None]:
+    """What the window shows at first: the simulated stand, a run, or the screen that was left."""
+
+    def show() -> None:
+        if simulated is not None:
+            presenter.open_simulated(simulated)
+            return
+        if run is None:
+            window.show_last_screen_soon()
+        else:
+            presenter.open_run(run)
+        presenter.connect_at_start()
+
+    return show
+
+
+def _run(
+    app: QApplication, window: MainWindow, presenter: WindowPresenter, show_first: Callable[[], None]
+) -> int:
     interrupts = _close_on_interrupt(presenter)
     window.show()
-    if simulated is None:
-        window.show_last_screen_soon()
-        QTimer.singleShot(0, window, presenter.connect_at_start)
-    else:
-        QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))
+    QTimer.singleShot(0, window, show_first)
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
     QTimer.singleShot(0, window, presenter.ask_to_recover)
     code = app.exec()

@@ -13,7 +13,7 @@ import app
 from app.cli.doctor import Finding, fail, ok, warn
 from app.runs.disk import is_writable
 from app.runs.errors import RunError
-from app.version import __version__
+from app.version import version_text
 from drivers.host_time import host_ns
 
 _NEEDED = {name: name for name in ("numpy", "scipy", "numba", "h5py", "msgspec", "tomlkit", "matplotlib")}
@@ -24,7 +24,7 @@ _AGAIN = "Install again: pip install --force-reinstall slipstand"
 
 def check_installation() -> Iterator[Finding]:
     """Look at versions, libraries, the examining process and the cache of compiled code."""
-    yield ok("slipstand", f"{__version__}, Python {platform.python_version()} on {platform.platform()}")
+    yield ok("slipstand", f"{version_text()}, Python {platform.python_version()} on {platform.platform()}")
     yield _libraries("libraries", _NEEDED, fail)
     yield _libraries("window", _OF_WINDOW, warn)
     yield _validator()

@@ -31,6 +31,19 @@ from app.qt.main import run_window
 sys.exit(run_window())
 """
 
+OPENED = """
+import sys
+from PySide6.QtGui import QGuiApplication
+from app.presenters.window import WindowPresenter
+def opened(presenter, path):
+    sys.stdout.write(f"{path} {QGuiApplication.windowIcon().isNull()}")
+    presenter.close_window()
+WindowPresenter.open_run = opened
+from app.__main__ import main
+sys.argv = ["slipstand", PATH]
+main()
+"""
+
 
 def run(code: str, **changes: str | None) -> subprocess.CompletedProcess[str]:
     """Run code in a fresh interpreter with a changed environment."""
@@ -70,3 +83,15 @@ def test_a_settings_file_that_cannot_be_used_is_said(tmp_path: Path) -> None:
     (line,) = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
     assert "stand.toml" in line
     assert "stand.toml" in result.stdout
+
+
+def test_a_run_that_is_opened_in_a_file_manager_is_opened_in_the_window(tmp_path: Path) -> None:
+    run_file = tmp_path / "Run 1.H5"
+    run_file.touch()
+    result = run(OPENED.replace("PATH", repr(str(run_file))), SLIPSTAND_CONFIG=str(tmp_path))
+    assert (result.returncode, result.stdout) == (0, f"{run_file} False"), result.stderr
+
+
+def test_a_run_that_is_not_there_is_no_command(tmp_path: Path) -> None:
+    result = run(OPENED.replace("PATH", repr(str(tmp_path / "none.h5"))), SLIPSTAND_CONFIG=str(tmp_path))
+    assert (result.returncode, result.stdout) == (2, "")
