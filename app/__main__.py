@@ -26,6 +26,7 @@ def _run() -> None:
     for name in _THREADS:  # small matrices: more threads only wait for each other
         os.environ.setdefault(name, "1")
     if getattr(sys, "frozen", False):
+        _keep_compiled_code_apart()
         arguments = _run_if_child(arguments)
     if arguments == ["--version"]:
         from app.version import version_text
@@ -44,6 +45,17 @@ def _run() -> None:
 def _is_run(arguments: list[str]) -> bool:
     """Tell whether the only argument is a run file, as when one is opened in a file manager."""
     return len(arguments) == 1 and arguments[0].lower().endswith(".h5") and os.path.isfile(arguments[0])  # noqa: PTH113 - pathlib takes a while to load
+
+
+def _keep_compiled_code_apart() -> None:
+    """Let numba keep what it compiles in a folder of ours.
+
+    It would be that of the program or, where that cannot be written, one that all programs share.
+    """
+    import platformdirs
+
+    folder = platformdirs.user_cache_path("slipstand", appauthor=False) / "compiled"
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(folder))
 
 
 def _run_if_child(arguments: list[str]) -> list[str]:

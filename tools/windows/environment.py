@@ -93,6 +93,18 @@ class WindowsEnvironment:
                 target.parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(source, target)
 
+    def prepare_builder(self, requirements: Path, wheel: Path, freezer: str) -> str:
+        """Make a Python that has the program from its wheel and PyInstaller, and return its path inside."""
+        target = self.inside / "builder" / "packages"
+        shutil.rmtree(target.parent, ignore_errors=True)
+        for given in (["--require-hashes", "-r", str(requirements)], ["--no-deps", str(wheel)], [freezer]):
+            self._install(target, *given)
+        python = self.inside / "builder" / "python"
+        shutil.copytree(self.inside / "python" / "cp311", python)
+        path = ["python311.zip", ".", "../packages", "import site", ""]
+        (python / "python311._pth").write_text("\n".join(path))
+        return f"{_INSIDE}/builder/python/python.exe"
+
     def run_python(
         self, *arguments: str, timeout_s: float, variables: Mapping[str, str] | None = None
     ) -> "subprocess.CompletedProcess[str]":
@@ -154,15 +166,18 @@ class WindowsEnvironment:
     def _install_packages(self) -> None:
         target = self.inside / "packages"
         shutil.rmtree(target, ignore_errors=True)
-        _check([str(self.folder / "tools" / "bin" / "uv"), "pip", "install", "--quiet", "--python-platform",
-                "x86_64-pc-windows-msvc", "--python-version", _PYTHON_VERSION, "--target", str(target),
-                "--link-mode", "copy",  # a file is changed below, and not that of uv's cache
-                "--require-hashes", *_index(), "-r", str(PROJECT / "requirements.lock")])  # fmt: skip
+        self._install(target, "--require-hashes", "-r", str(PROJECT / "requirements.lock"))
         port = target / "serial" / "serialwin32.py"
         source = port.read_text(encoding="utf-8")
         if source.count(_TIMEOUT) != 1:
             raise EnvironmentMissingError(f"{port} is not as it was: see how it treats ERROR_TIMEOUT")
         port.write_text(source.replace(_TIMEOUT, _TIMEOUT_OF_WINE), encoding="utf-8")
+
+    def _install(self, target: Path, *requirements: str) -> None:
+        _check([str(self.folder / "tools" / "bin" / "uv"), "pip", "install", "--quiet", "--python-platform",
+                "x86_64-pc-windows-msvc", "--python-version", _PYTHON_VERSION, "--target", str(target),
+                "--link-mode", "copy",  # files are changed, and not those of uv's cache
+                *_index(), *requirements])  # fmt: skip
 
     def _build_shims(self) -> None:
         table = self._check_inside(["x86_64-w64-mingw32-objdump", "-p", f"{_WINE_LIBRARIES}/ucrtbase.dll"])

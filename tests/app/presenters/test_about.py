@@ -6,12 +6,12 @@ import pytest
 
 from app.log import FOLDER_VARIABLE
 from app.presenters import about
-from app.version import __version__
+from app.version import version_text
 
 
 def test_the_program_and_every_library_state_a_licence() -> None:
     ours, python, *libraries = about.components()
-    assert (ours.version, ours.licence) == (__version__, "MIT")
+    assert (ours.version, ours.licence) == (version_text(), "MIT")
     assert python.name == "Python"
     stated = {part.name: part.licence for part in libraries}
     assert "LGPL-3.0" in stated["PySide6-Essentials"]
@@ -22,7 +22,7 @@ def test_the_program_and_every_library_state_a_licence() -> None:
 
 def test_versions_are_copied_in_lines() -> None:
     lines = about.versions_text().splitlines()
-    assert lines[0] == f"Slipstand {__version__}"
+    assert lines[0] == f"Slipstand {version_text()}"
     assert len(lines) == len(about.components()) + 1
 
 

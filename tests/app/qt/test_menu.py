@@ -11,7 +11,7 @@ from window_desk import Desk
 
 from app.log import FOLDER_VARIABLE
 from app.qt.menu import AboutDialog
-from app.version import __version__
+from app.version import version_text
 
 
 def action(desk: Desk, text: str) -> QAction:
@@ -50,13 +50,13 @@ def test_about_names_version_licences_and_qt(desk: Desk) -> None:
     (dialog,) = desk.window.findChildren(AboutDialog)
     desk.qtbot.wait(1)
     words = visible_words(dialog)
-    for expected in (f"Slipstand {__version__}", "Licence: MIT", f"Qt {qVersion()}", "numpy", "LGPL-3.0"):
+    for expected in (f"Slipstand {version_text()}", "Licence: MIT", f"Qt {qVersion()}", "numpy", "LGPL-3.0"):
         assert expected in words
     assert clipped_words(dialog) == []
     assert not dialog.isModal()
     (copy,) = [button for button in dialog.findChildren(QPushButton) if button.text() == "Copy versions"]
     copy.click()
-    assert QApplication.clipboard().text().startswith(f"Slipstand {__version__}\nPython ")
+    assert QApplication.clipboard().text().startswith(f"Slipstand {version_text()}\nPython ")
     dialog.close()
 
 

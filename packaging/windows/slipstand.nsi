@@ -1,0 +1,109 @@
+; Installer of Slipstand. `python -m tools.packages windows` calls makensis with VERSION, FOLDER, TARGET, ICON,
+; LICENSE and KILOBYTES. Silently: setup.exe /S [/D=C:\folder], and uninstall.exe /S.
+Unicode true
+Target amd64-unicode
+!include "MUI2.nsh"
+!include "x64.nsh"
+
+Name "Slipstand ${VERSION}"
+OutFile "${TARGET}"
+InstallDir "$PROGRAMFILES64\Slipstand"
+RequestExecutionLevel admin
+SetCompressor /SOLID lzma
+BrandingText "Slipstand ${VERSION}"
+VIProductVersion "${VERSION}.0"
+VIAddVersionKey ProductName "Slipstand"
+VIAddVersionKey FileDescription "Installer of Slipstand"
+VIAddVersionKey FileVersion "${VERSION}"
+VIAddVersionKey LegalCopyright "The Slipstand developers, MIT License"
+
+!define MUI_ICON "${ICON}"
+!define MUI_UNICON "${ICON}"
+!define MUI_FINISHPAGE_RUN "$INSTDIR\slipstand-window.exe"
+!insertmacro MUI_PAGE_LICENSE "${LICENSE}"
+!insertmacro MUI_PAGE_DIRECTORY
+!insertmacro MUI_PAGE_INSTFILES
+!insertmacro MUI_PAGE_FINISH
+!insertmacro MUI_UNPAGE_CONFIRM
+!insertmacro MUI_UNPAGE_INSTFILES
+!insertmacro MUI_LANGUAGE "English"
+!insertmacro MUI_LANGUAGE "Russian"
+
+!define UNINSTALL "Software\Microsoft\Windows\CurrentVersion\Uninstall\Slipstand"
+!define COMMAND "Software\Microsoft\Windows\CurrentVersion\App Paths\slipstand.exe"
+!define RUN_FILE "Software\Classes\Slipstand.Run"
+
+Function .onInit
+  ${IfNot} ${RunningX64}
+    MessageBox MB_ICONSTOP "Slipstand needs Windows with 64 bits." /SD IDOK
+    Abort
+  ${EndIf}
+  SetRegView 64
+  SetShellVarContext all
+  ; An update goes where the program is, and replaces it. Settings and recordings are not in its folder.
+  ReadRegStr $0 HKLM "${UNINSTALL}" "InstallLocation"
+  StrCmp $0 "" +2
+    StrCpy $INSTDIR $0
+FunctionEnd
+
+Function un.onInit
+  SetRegView 64
+  SetShellVarContext all
+FunctionEnd
+
+Section
+  ; A program that runs keeps its file: said before anything is removed.
+  ClearErrors
+  IfFileExists "$INSTDIR\slipstand.exe" 0 free
+    Rename "$INSTDIR\slipstand.exe" "$INSTDIR\slipstand.exe.old"
+    IfErrors 0 renamed
+      MessageBox MB_ICONSTOP "Slipstand is running. Close it and install again." /SD IDOK
+      SetErrorLevel 2
+      Abort
+    renamed:
+    RMDir /r "$INSTDIR\_internal"
+    Delete "$INSTDIR\slipstand.exe.old"
+  free:
+  SetOutPath "$INSTDIR"
+  File /r "${FOLDER}\*.*"
+  WriteUninstaller "$INSTDIR\uninstall.exe"
+  CreateShortcut "$SMPROGRAMS\Slipstand.lnk" "$INSTDIR\slipstand-window.exe"
+
+  WriteRegStr HKLM "${COMMAND}" "" "$INSTDIR\slipstand.exe"
+  ; Run files are HDF5: Slipstand is offered to open them, and does not take them from another program.
+  WriteRegStr HKLM "${RUN_FILE}" "" "Slipstand run"
+  WriteRegStr HKLM "${RUN_FILE}\DefaultIcon" "" "$INSTDIR\slipstand-window.exe,0"
+  WriteRegStr HKLM "${RUN_FILE}\shell\open\command" "" '"$INSTDIR\slipstand-window.exe" "%1"'
+  WriteRegStr HKLM "Software\Classes\.h5\OpenWithProgids" "Slipstand.Run" ""
+
+  WriteRegStr HKLM "${UNINSTALL}" "DisplayName" "Slipstand"
+  WriteRegStr HKLM "${UNINSTALL}" "DisplayVersion" "${VERSION}"
+  WriteRegStr HKLM "${UNINSTALL}" "Publisher" "The Slipstand developers"
+  WriteRegStr HKLM "${UNINSTALL}" "DisplayIcon" "$INSTDIR\slipstand-window.exe"
+  WriteRegStr HKLM "${UNINSTALL}" "InstallLocation" "$INSTDIR"
+  WriteRegStr HKLM "${UNINSTALL}" "UninstallString" '"$INSTDIR\uninstall.exe"'
+  WriteRegStr HKLM "${UNINSTALL}" "QuietUninstallString" '"$INSTDIR\uninstall.exe" /S'
+  WriteRegDWORD HKLM "${UNINSTALL}" "EstimatedSize" ${KILOBYTES}
+  WriteRegDWORD HKLM "${UNINSTALL}" "NoModify" 1
+  WriteRegDWORD HKLM "${UNINSTALL}" "NoRepair" 1
+SectionEnd
+
+Section "Uninstall"
+  RMDir /r "$INSTDIR\_internal"
+  Delete "$INSTDIR\slipstand.exe"
+  Delete "$INSTDIR\slipstand-window.exe"
+  Delete "$INSTDIR\uninstall.exe"
+  RMDir "$INSTDIR"
+  Delete "$SMPROGRAMS\Slipstand.lnk"
+  DeleteRegKey HKLM "${UNINSTALL}"
+  DeleteRegKey HKLM "${COMMAND}"
+  DeleteRegKey HKLM "${RUN_FILE}"
+  DeleteRegValue HKLM "Software\Classes\.h5\OpenWithProgids" "Slipstand.Run"
+  DeleteRegKey /ifempty HKLM "Software\Classes\.h5\OpenWithProgids"
+  DeleteRegKey /ifempty HKLM "Software\Classes\.h5"
+  ; What the program keeps to start faster, and its log, for who uninstalls. Settings and recordings stay.
+  SetShellVarContext current
+  RMDir /r "$LOCALAPPDATA\slipstand\Cache"
+  RMDir /r "$LOCALAPPDATA\slipstand\Logs"
+  RMDir "$LOCALAPPDATA\slipstand"
+SectionEnd

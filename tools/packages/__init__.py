@@ -1,0 +1,1 @@
+"""What Slipstand is installed from: `python -m tools.packages`, called by `make packages`."""
