@@ -33,13 +33,26 @@ def _run() -> None:
 
         sys.stdout.write(f"slipstand {version_text()}\n")
     elif arguments in ([], ["--simulated"]) or _is_run(arguments):
-        from app.qt.main import run_window
-
-        sys.exit(run_window("--simulated" in arguments, arguments[0] if _is_run(arguments) else None))
+        _run_window(arguments)
     else:
         from app.cli import run
 
         run()
+
+
+def _run_window(arguments: list[str]) -> None:
+    """Open the window and exit; say it in one line where the system lacks what Qt needs."""
+    try:
+        from app.qt.main import run_window
+    except ModuleNotFoundError:
+        raise
+    except ImportError as error:  # a shared library
+        sys.stderr.write(
+            f"error: there is no window here: {error}. Install what Qt needs, on Debian and Ubuntu: "
+            "apt-get install libegl1 libgl1 libopengl0. The commands need none of it: slipstand --help\n"
+        )
+        sys.exit(1)
+    sys.exit(run_window("--simulated" in arguments, arguments[0] if _is_run(arguments) else None))
 
 
 def _is_run(arguments: list[str]) -> bool:

@@ -95,3 +95,21 @@ def test_a_run_that_is_opened_in_a_file_manager_is_opened_in_the_window(tmp_path
 def test_a_run_that_is_not_there_is_no_command(tmp_path: Path) -> None:
     result = run(OPENED.replace("PATH", repr(str(tmp_path / "none.h5"))), SLIPSTAND_CONFIG=str(tmp_path))
     assert (result.returncode, result.stdout) == (2, "")
+
+
+def test_a_system_without_the_libraries_of_qt_is_told_in_one_line() -> None:
+    code = """
+import sys
+class Missing:
+    def find_spec(self, name, *_):
+        if name == "PySide6.QtGui":
+            raise ImportError("libGL.so.1: cannot open shared object file: No such file or directory")
+sys.meta_path.insert(0, Missing())
+from app.__main__ import main
+sys.argv = ["slipstand"]
+main()
+"""
+    result = run(code)
+    assert (result.returncode, result.stderr.count("\n")) == (1, 1)
+    assert "libGL.so.1" in result.stderr
+    assert "apt-get install" in result.stderr
