@@ -1,7 +1,7 @@
 # Everything starts from Python 3.11 or later with pip, make and a C library; see README.md.
 PYTHON ?= python3
 VENV := .venv
-BIN := $(VENV)/bin
+BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 READY := $(VENV)/.ready
 # Tests wait for child processes now and then: one worker more than there are processors.
 TEST_WORKERS = $(shell $(PYTHON) -c 'import os; print(1 + (os.cpu_count() or 1))')
@@ -17,7 +17,7 @@ FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 # A window system, its window manager, and hands of an operator, for tests of the window.
 DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 
-.PHONY: docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
+.PHONY: docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -33,6 +33,10 @@ help:
 	@echo "make windows  demo, ports, window and tests on Windows' Python under Wine, as root (docs/systems.md); the first time half an hour"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make desktop-tools   window system and manager for the test of a day in the window, which is skipped without them"
+	@echo "make packages   wheel, tarball and Debian package, or on Windows the installer, into dist (packaging/README.md)"
+	@echo "make packages KINDS=windows   the installer of Windows, under Wine, as root"
+	@echo "make try-packages   them installed, used and removed on bare Debian 12 and 13, as root; half an hour"
+	@echo "make quick-test PYTHON=python3.13   tests that need no device, stand or window: half a minute"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
 	@echo "make docs    the documentation site into docs/_build/html, which needs no network"
 	@echo "make translations   new texts into the catalogues of messages/locale"
@@ -136,6 +140,15 @@ peers: setup
 windows: setup
 	@$(call install_packages,debootstrap,true)
 	$(BIN)/python -m tools.windows
+
+# KINDS: some of wheel, tarball, deb, windows.
+packages: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/python -m tools.packages $(KINDS)
+
+try-packages: setup
+	@$(call install_packages,debootstrap xvfb imagemagick,true)
+	$(BIN)/python -m tools.packages.checks
 
 docs: setup
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html

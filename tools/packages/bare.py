@@ -1,4 +1,4 @@
-"""Bare Debian systems to try the packages in: a folder made once, and what a trial changes in a layer above it."""
+"""Bare Debian to try packages in: a folder made once, and what a trial changes in a layer above it."""
 
 import os
 import shutil
