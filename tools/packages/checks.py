@@ -6,6 +6,7 @@
 import argparse
 import json
 import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -16,9 +17,10 @@ from app.version import __version__
 from tools.packages import linux
 from tools.packages.bare import SUITES, USER, BareDebian
 from tools.packages.folder import BUILD, DIST
+from tools.packages.windows import INSTALLER_NAME
 from tools.windows.__main__ import default_folder
 from tools.windows.checks import Check
-from tools.windows.environment import EnvironmentMissingError
+from tools.windows.environment import EnvironmentMissingError, WindowsEnvironment
 
 _TRUE_FRICTION = 0.1
 _STARTS = 3
@@ -27,33 +29,57 @@ _DISPLAY = 78
 _KEPT = f"/home/{USER}/Documents/Slipstand"
 _OWN = (".cache", ".config", ".local/state")
 """Folders of a user that the program has one in, and that no package may remove from there."""
+_WINDOWS_FOLDER = "drive_c/Program Files/Slipstand"
+_WINDOWS_S = 1200.0
+_WINDOW_OF_WINDOWS = r"""
+rm -f /tmp/.X{display}-lock /tmp/.X11-unix/X{display}
+Xvfb :{display} -screen 0 1280x800x24 > /dev/null 2>&1 &
+export DISPLAY=:{display}
+sleep 2; openbox > /dev/null 2>&1 &
+wine {program} --simulated > /tmp/window.log 2>&1 &
+for second in $(seq 150); do
+  sleep 1; xdotool key a
+  [ -n "$(find /opt/windows/prefix/drive_c/users -name '*.h5.recording')" ] && break
+done
+sleep 45; import -window root /tmp/installed-window.png; cat /tmp/window.log
+"""
 
 
 def main() -> int:
     """Try what is named; 1 if something fails, with a line for each check."""
     kinds = {"tarball": try_tarball, "deb": try_debian_package}
+    windows = "windows"
     parser = argparse.ArgumentParser(prog="python -m tools.packages.checks", description=__doc__)
-    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"some of: {', '.join(kinds)}")
+    parser.add_argument("kinds", nargs="*", metavar="KIND", help=f"some of: {', '.join((*kinds, windows))}")
     parser.add_argument("--suites", nargs="*", default=list(SUITES), help="names of Debian's releases")
     arguments = parser.parse_args()
-    if unknown := set(arguments.kinds) - set(kinds):
+    if unknown := set(arguments.kinds) - {*kinds, windows}:
         parser.error(f"unknown: {', '.join(unknown)}")
     passed = True
-    for suite in arguments.suites:
-        system = BareDebian(default_folder().absolute().parent / "bare", suite, DIST)
-        for kind in arguments.kinds or kinds:
-            try:
+    try:
+        for suite in arguments.suites:
+            system = BareDebian(default_folder().absolute().parent / "bare", suite, DIST)
+            for kind in [kind for kind in arguments.kinds or kinds if kind in kinds]:
                 system.prepare()
-            except EnvironmentMissingError as error:
-                sys.stderr.write(f"error: {error}\n")
-                return 1
-            for check in kinds[kind](system):
-                passed = passed and check.passed
-                sys.stdout.write(
-                    f"{'ok  ' if check.passed else 'FAIL'}  {suite}, {check.name}: {check.figures}\n"
-                )
-                sys.stdout.flush()
+                passed = _report(f"{suite}, {kind}", kinds[kind](system)) and passed
+        if windows in arguments.kinds:
+            environment = WindowsEnvironment(default_folder().absolute())
+            environment.prepare()
+            passed = _report(windows, try_installer(environment)) and passed
+    except EnvironmentMissingError as error:
+        sys.stderr.write(f"error: {error}\n")
+        return 1
     return 0 if passed else 1
+
+
+def _report(system: str, checks: Iterator[Check]) -> bool:
+    """Print a line for each check; false if one failed."""
+    passed = True
+    for check in checks:
+        passed = passed and check.passed
+        sys.stdout.write(f"{'ok  ' if check.passed else 'FAIL'}  {system}, {check.name}: {check.figures}\n")
+        sys.stdout.flush()
+    return passed
 
 
 def try_tarball(system: BareDebian) -> Iterator[Check]:
@@ -88,6 +114,54 @@ def try_debian_package(system: BareDebian) -> Iterator[Check]:
     yield _nothing_left(system)
 
 
+def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
+    """Install it silently under Wine, record the simulated stand twice, look at the window, and uninstall."""
+    prefix = environment.inside / "prefix"
+    folder, inside = prefix / _WINDOWS_FOLDER, f"/opt/windows/prefix/{_WINDOWS_FOLDER}"
+    shutil.copy(DIST / INSTALLER_NAME, environment.inside / "setup.exe")
+    yield _windows_step(environment, "install", ["wine", "/opt/windows/setup.exe", "/S"], _WINDOWS_S)
+    for name in ("ucrtbase.dll", "ucrtw.dll", "icuuc.dll"):  # what Wine lacks, not Windows
+        shutil.copy(environment.inside / "python" / "cp311" / name, folder)
+    program = ["wine", f"{inside}/slipstand.exe"]
+    for _ in range(2):
+        yield _windows_step(environment, "--version", [*program, "--version"], 300.0)
+    for name in ("first demo, which compiles", "second demo"):
+        began_s = time.perf_counter()
+        ended = environment.run([*program, "demo", "--json"], _WINDOWS_S)
+        took_s = time.perf_counter() - began_s
+        found = _friction(name, ended.stdout, took_s)
+        yield found if ended.returncode == 0 else Check(name, False, ended.stderr.strip()[-300:])
+    script = _WINDOW_OF_WINDOWS.format(
+        display=_DISPLAY, program=shlex.quote(f"{inside}/slipstand-window.exe")
+    )
+    said = environment.run(["bash", "-c", script], _WINDOWS_S).stdout.strip()
+    picture = environment.root / "tmp" / "installed-window.png"
+    runs = list((prefix / "drive_c" / "users").rglob("*_003.h5"))
+    yield Check("window", picture.is_file() and bool(runs), f"{picture} {len(runs)} run {said[-300:]}")
+    for name in ("ucrtbase.dll", "ucrtw.dll", "icuuc.dll"):
+        (folder / name).unlink()
+    yield _windows_step(
+        environment, "uninstall", ["sh", "-c", f"wine '{inside}/uninstall.exe' /S; wineserver -w"], 300.0
+    )
+    left = [path for path in (prefix / "drive_c").rglob("*") if "slipstand" in path.name.lower()]
+    kept = [path for path in left if "Documents" in path.parts]
+    strange = sorted(str(path.relative_to(prefix)) for path in left if path not in kept)
+    runs = list((prefix / "drive_c" / "users").rglob("*.h5"))
+    yield Check(
+        "nothing is left but recordings", not strange, f"{len(runs)} runs kept; {strange or 'no trace'}"
+    )
+
+
+def _windows_step(environment: WindowsEnvironment, name: str, command: list[str], timeout_s: float) -> Check:
+    began_s = time.perf_counter()
+    ended = environment.run(command, timeout_s)
+    took_s = time.perf_counter() - began_s
+    figures = (
+        f"{took_s:.1f} s {ended.stdout.strip()[-100:]}" if ended.returncode == 0 else ended.stderr[-300:]
+    )
+    return Check(name, ended.returncode == 0, figures.strip())
+
+
 def _use(system: BareDebian, program: str) -> Iterator[Check]:
     """Time the start, record the simulated stand twice, and read the run."""
     times = []
@@ -108,7 +182,11 @@ def _demo(system: BareDebian, program: str, name: str) -> Check:
     took_s = time.perf_counter() - began_s
     if ended.returncode:
         return Check(name, False, ended.stderr.strip()[-300:])
-    friction = json.loads(ended.stdout)["results"]["friction_dynamic"]
+    return _friction(name, ended.stdout, took_s)
+
+
+def _friction(name: str, printed: str, took_s: float) -> Check:
+    friction = json.loads(printed)["results"]["friction_dynamic"]
     value, uncertainty = friction["value"], friction["standard_uncertainty"]
     figures = f"f_d {value:.5f} ± {uncertainty:.5f}, true {_TRUE_FRICTION}, in {took_s:.0f} s"
     return Check(name, abs(value - _TRUE_FRICTION) < 3.0 * uncertainty, figures)
