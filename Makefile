@@ -36,7 +36,7 @@ help:
 	@echo "make packages   wheel, tarball and Debian package, or on Windows the installer, into dist (packaging/README.md)"
 	@echo "make packages KINDS=windows   the installer of Windows, under Wine, as root"
 	@echo "make try-packages   them installed, used and removed on bare Debian 12 and 13, as root; half an hour"
-	@echo "make quick-test PYTHON=python3.13   tests that need no device, stand or window: half a minute"
+	@echo "make quick-test PYTHON=python3.13   some tests with another Python, in half a minute"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
 	@echo "make docs    the documentation site into docs/_build/html, which needs no network"
 	@echo "make translations   new texts into the catalogues of messages/locale"
@@ -91,6 +91,15 @@ run: setup
 test: compiled
 	$(BIN)/python -m pytest tests -m "not realtime" -n $(TEST_WORKERS) --dist loadfile
 	$(BIN)/python -m pytest tests -m realtime -n 4 --dist loadfile
+
+# With another Python, given by PYTHON, in an environment of its own. uv: pip takes minutes.
+QUICK_TESTS := tests/config tests/messages tests/app/test_child_process.py tests/app/test_version.py tests/app/runs/test_schema.py tests/app/runs/test_run_round_trip.py tests/app/runs/test_validation.py
+quick-test: setup
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+	$(BIN)/python -m uv venv --quiet --clear --python $(PYTHON) build/quick
+	$(BIN)/python -m uv pip install --quiet --python build/quick --require-hashes -r requirements.lock
+	$(BIN)/python -m uv pip install --quiet --python build/quick --no-deps --no-build-isolation --editable .
+	build/quick/$(notdir $(BIN))/python -m pytest -m "not realtime" -n 2 --dist loadfile $(QUICK_TESTS)
 
 # Once, before processes that start at once would each do it.
 compiled: setup
