@@ -41,7 +41,9 @@ for second in $(seq 150); do
   sleep 1; xdotool key a
   [ -n "$(find /opt/windows/prefix/drive_c/users -name '*.h5.recording')" ] && break
 done
-sleep 45; import -window root /tmp/installed-window.png; cat /tmp/window.log
+sleep 60; import -window root /tmp/installed-window.png
+xdotool key alt+F4; for second in $(seq 30); do sleep 1; pgrep -f slipstand-window > /dev/null || break; done
+cat /tmp/window.log
 """
 
 
@@ -118,6 +120,7 @@ def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
     """Install it silently under Wine, record the simulated stand twice, look at the window, and uninstall."""
     prefix = environment.inside / "prefix"
     folder, inside = prefix / _WINDOWS_FOLDER, f"/opt/windows/prefix/{_WINDOWS_FOLDER}"
+    before = len(list((prefix / "drive_c" / "users").rglob("*.h5")))
     shutil.copy(DIST / INSTALLER_NAME, environment.inside / "setup.exe")
     yield _windows_step(environment, "install", ["wine", "/opt/windows/setup.exe", "/S"], _WINDOWS_S)
     for name in ("ucrtbase.dll", "ucrtw.dll", "icuuc.dll"):  # what Wine lacks, not Windows
@@ -136,15 +139,17 @@ def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
     )
     said = environment.run(["bash", "-c", script], _WINDOWS_S).stdout.strip()
     picture = environment.root / "tmp" / "installed-window.png"
-    runs = list((prefix / "drive_c" / "users").rglob("*_003.h5"))
-    yield Check("window", picture.is_file() and bool(runs), f"{picture} {len(runs)} run {said[-300:]}")
+    recorded = len(list((prefix / "drive_c" / "users").rglob("*.h5"))) - before - 2
+    yield Check("window", picture.is_file() and recorded == 1, f"{picture} {recorded} run {said[-300:]}")
     for name in ("ucrtbase.dll", "ucrtw.dll", "icuuc.dll"):
         (folder / name).unlink()
     yield _windows_step(
         environment, "uninstall", ["sh", "-c", f"wine '{inside}/uninstall.exe' /S; wineserver -w"], 300.0
     )
     left = [path for path in (prefix / "drive_c").rglob("*") if "slipstand" in path.name.lower()]
-    kept = [path for path in left if "Documents" in path.parts]
+    users = prefix / "drive_c" / "users" / "root"
+    own = (users / "Documents" / "Slipstand", users / "AppData" / "Local" / "slipstand")  # runs and settings
+    kept = [path for path in left if any(path.is_relative_to(folder) for folder in own)]
     strange = sorted(str(path.relative_to(prefix)) for path in left if path not in kept)
     runs = list((prefix / "drive_c" / "users").rglob("*.h5"))
     yield Check(
