@@ -98,25 +98,25 @@ def _first_screen(
 ) -> Callable[[], None]:
     """What the window shows at first: the simulated stand, a run, or the screen that was left."""
 
-    def show() -> None:
+    def show_soon() -> None:
         if simulated is not None:
-            presenter.open_simulated(simulated)
+            QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))
             return
         if run is None:
             window.show_last_screen_soon()
         else:
-            presenter.open_run(run)
-        presenter.connect_at_start()
+            QTimer.singleShot(0, window, lambda: presenter.open_run(run))
+        QTimer.singleShot(0, window, presenter.connect_at_start)
 
-    return show
+    return show_soon
 
 
 def _run(
-    app: QApplication, window: MainWindow, presenter: WindowPresenter, show_first: Callable[[], None]
+    app: QApplication, window: MainWindow, presenter: WindowPresenter, show_soon: Callable[[], None]
 ) -> int:
     interrupts = _close_on_interrupt(presenter)
     window.show()
-    QTimer.singleShot(0, window, show_first)
+    show_soon()
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
     QTimer.singleShot(0, window, presenter.ask_to_recover)
     code = app.exec()
