@@ -157,8 +157,8 @@ app = _typer(
     add_completion=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Measures dry friction on a shaking stand. "
-    "`slipstand` alone opens the window, `slipstand RUN.h5` opens a run in it, `slipstand --simulated` opens it "
-    "on the simulated stand.",
+    "`slipstand` alone opens the window, `slipstand RUN.h5` opens a run in it, `slipstand --simulated` opens"
+    " it on the simulated stand.",
 )
 app.add_typer(
     _typer(cls=DeviceGroup, help="Devices, ports and the simulated stand.", no_args_is_help=True),
