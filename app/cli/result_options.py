@@ -143,7 +143,10 @@ class ReportOptions:
     output: Path = option("-o --output", "PDF file to write.", REQUIRED)
     date: str = option("--date", "Date of the report; today if absent.", "", metavar="DATE")
     title: str = option("--title", "Title of the report.", "")
-    laboratory: str = option("--laboratory", "Who issues it.", "")
+    laboratory: str = option("--laboratory", "Who issues it; as in settings.toml if absent.", "")
+    customer: str = option("--customer", "Whom it is for.", "")
+    number: str = option("--number", "Number of the report; of its date and inputs if absent.", "")
+    method: str = option("--method", "Method of test with its reference; the paper's if absent.", "")
     exclude: list[str] | None = shared.exclude()
     jobs: JobOptions
     force: bool = shared.force()
