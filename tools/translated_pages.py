@@ -1,8 +1,8 @@
 """Keep translated pages in step with their sources: `python -m tools.translated_pages`.
 
 A translated page names its source, and the hash of each section of it that was translated, in a comment at
-its end. A test fails once a section of the source has changed. Revise the translation of the sections that the
-command names, then run it with `--revised`, which writes the hashes of today.
+its end. A test fails once a section of the source has changed. Revise the translation of the sections that
+the command names, then run it with `--revised`, which writes the hashes of today.
 """
 
 import hashlib
