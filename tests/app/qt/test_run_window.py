@@ -23,9 +23,14 @@ MainWindow.show = lambda window: (show(window), os.kill(os.getpid(), signal.SIGI
 sys.exit(run_window())
 """
 RUN_NAMED = """
-import os, signal, sys, threading
+import os, signal, sys
 from app.__main__ import main
-threading.Timer(2.0, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+from app.presenters.window import WindowPresenter
+open_run = WindowPresenter.open_run
+def interrupted(window, path):
+    open_run(window, path)
+    os.kill(os.getpid(), signal.SIGINT)
+WindowPresenter.open_run = interrupted
 sys.argv = ["slipstand", {path!r}]
 main()
 """
