@@ -6,6 +6,8 @@ import sys
 from app.interrupts import EXIT_CODE, LINE, follow_interrupts, ignore_interrupts
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+_RUN_SUFFIX = ".h5"
+_COMPLETION = "_SLIPSTAND_COMPLETE"  # set by a shell that asks for the next word of a command
 
 
 def main() -> None:
@@ -31,10 +33,14 @@ def _run() -> None:
         from app.version import __version__
 
         sys.stdout.write(f"slipstand {__version__}\n")
-    elif arguments in ([], ["--simulated"]):
+    elif _COMPLETION not in os.environ and arguments in ([], ["--simulated"]):
         from app.qt.main import run_window
 
         sys.exit(run_window(simulated=bool(arguments)))
+    elif len(arguments) == 1 and arguments[0].lower().endswith(_RUN_SUFFIX):
+        from app.qt.main import run_window
+
+        sys.exit(run_window(run=arguments[0]))
     else:
         from app.cli import run
 

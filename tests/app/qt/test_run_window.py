@@ -22,6 +22,18 @@ show = MainWindow.show
 MainWindow.show = lambda window: (show(window), os.kill(os.getpid(), signal.SIGINT))
 sys.exit(run_window())
 """
+RUN_NAMED = """
+import os, signal, sys
+from app.__main__ import main
+from app.presenters.window import WindowPresenter
+open_run = WindowPresenter.open_run
+def interrupted(window, path):
+    open_run(window, path)
+    os.kill(os.getpid(), signal.SIGINT)
+WindowPresenter.open_run = interrupted
+sys.argv = ["slipstand", {path!r}]
+main()
+"""
 NOWHERE = {"QT_QPA_PLATFORM": None, "DISPLAY": None, "WAYLAND_DISPLAY": None}
 REFUSED = """
 import sys
@@ -70,3 +82,19 @@ def test_a_settings_file_that_cannot_be_used_is_said(tmp_path: Path) -> None:
     (line,) = [line for line in result.stderr.splitlines() if line.startswith("error: ")]
     assert "stand.toml" in line
     assert "stand.toml" in result.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot send itself Ctrl-C there")
+def test_a_run_that_is_named_is_opened(tmp_path: Path, short_runs: list[Path]) -> None:
+    result = run(RUN_NAMED.format(path=str(short_runs[0])), SLIPSTAND_CONFIG=str(tmp_path))
+    assert result.returncode == 130, result.stderr
+    assert "Traceback" not in result.stderr
+    (recent,) = tomllib.loads((tmp_path / "recent.toml").read_text(encoding="utf-8"))["runs"]
+    assert Path(recent) == short_runs[0]
+
+
+def test_a_run_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    result = run(RUN_NAMED.format(path="absent.h5"), SLIPSTAND_CONFIG=str(tmp_path))
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: absent.h5: there is no such file.")
+    assert result.stderr.count("\n") == 1
