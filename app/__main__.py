@@ -6,6 +6,8 @@ import sys
 from app.interrupts import EXIT_CODE, LINE, follow_interrupts, ignore_interrupts
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+_RUN_SUFFIX = ".h5"
+_COMPLETION = "_SLIPSTAND_COMPLETE"  # set by a shell that asks for the next word of a command
 
 
 def main() -> None:
@@ -32,15 +34,17 @@ def _run() -> None:
         from app.version import version_text
 
         sys.stdout.write(f"slipstand {version_text()}\n")
-    elif arguments in ([], ["--simulated"]) or _is_run(arguments):
-        _run_window(arguments)
+    elif _COMPLETION not in os.environ and arguments in ([], ["--simulated"]):
+        _run_window(simulated=bool(arguments))
+    elif len(arguments) == 1 and arguments[0].lower().endswith(_RUN_SUFFIX):
+        _run_window(run=arguments[0])
     else:
         from app.cli import run
 
         run()
 
 
-def _run_window(arguments: list[str]) -> None:
+def _run_window(simulated: bool = False, run: str = "") -> None:
     """Open the window and exit; say it in one line where the system lacks what Qt needs."""
     try:
         from app.qt.main import run_window
@@ -52,12 +56,7 @@ def _run_window(arguments: list[str]) -> None:
             "apt-get install libegl1 libgl1 libopengl0. The commands need none of it: slipstand --help\n"
         )
         sys.exit(1)
-    sys.exit(run_window("--simulated" in arguments, arguments[0] if _is_run(arguments) else None))
-
-
-def _is_run(arguments: list[str]) -> bool:
-    """Tell whether the only argument is a run file, as when one is opened in a file manager."""
-    return len(arguments) == 1 and arguments[0].lower().endswith(".h5") and os.path.isfile(arguments[0])  # noqa: PTH113 - pathlib takes a while to load
+    sys.exit(run_window(simulated=simulated, run=run))
 
 
 def _keep_compiled_code_apart() -> None:

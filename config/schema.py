@@ -330,6 +330,10 @@ class Settings(_Checked, frozen=True):
     connect_at_start: bool = False  # whether the window connects to the last amplifier by itself
     log_level: Literal["error", "warning", "info", "debug"] = "info"  # of all logs
     displacement_unit: Literal["mm", "um"] = "mm"  # of displacements on screens
+    laboratory: str = ""  # who issues reports
+    laboratory_address: str = ""  # printed below it; several lines by \n
+    laboratory_logo: str = ""
+    """PNG, JPEG or SVG file, printed on the first page of reports; a relative path is one in this folder."""
 
     def __post_init__(self) -> None:
         if self.language not in ("system", *languages()):

@@ -12,6 +12,7 @@ from typing import Any
 
 import hypothesis
 import pytest
+from schema_kit import check_output
 
 from app.__main__ import main
 from messages import i18n
@@ -84,11 +85,14 @@ class Outcome:
     code: int
     out: str
     err: str
+    arguments: tuple[str, ...] = ()
 
     @property
     def json(self) -> Any:
-        """Stdout as the one JSON document that it must be."""
-        return json.loads(self.out)
+        """Stdout as the one JSON document that it must be, as its published schema has it."""
+        document = json.loads(self.out)
+        check_output(self.arguments, document)
+        return document
 
 
 Slipstand = Callable[..., Outcome]
@@ -107,6 +111,6 @@ def slipstand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatc
         except SystemExit as ending:
             code = ending.code or 0
         said = capsys.readouterr()
-        return Outcome(int(str(code)), said.out, said.err)
+        return Outcome(int(str(code)), said.out, said.err, tuple(map(str, arguments)))
 
     return run

@@ -1,10 +1,13 @@
 """Pages that are made from the program agree with it, and the site builds without a warning."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
 
-from tools import reference_pages
+import pytest
+
+from tools import reference_pages, translated_pages
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -42,3 +45,31 @@ def test_the_site_builds_without_a_warning(tmp_path) -> None:
     assert built.returncode == 0, built.stderr
     assert "friction" in (tmp_path / "html" / "searchindex.js").read_text("utf-8")
     assert (tmp_path / "html" / "reference" / "api.html").read_text("utf-8").count("slipstand.Result") > 1
+
+
+@pytest.mark.parametrize("page", translated_pages.pages(), ids=lambda page: f"{page.parent.name}/{page.stem}")
+def test_a_translated_page_is_as_new_as_its_source(page: Path) -> None:
+    assert translated_pages.faults(page) == [], "then run python -m tools.translated_pages --revised"
+
+
+@pytest.mark.parametrize("page", translated_pages.pages(), ids=lambda page: f"{page.parent.name}/{page.stem}")
+def test_a_translated_page_has_the_code_rows_and_pictures_of_its_source(page: Path) -> None:
+    source = (translated_pages.DOCS / translated_pages.SOURCES[page.name]).read_text("utf-8")
+    text = page.read_text("utf-8")
+    for pattern in (r"^```.*?^```", r"\]\(\.\./screenshots/[^)]*\)"):
+        assert re.findall(pattern, text, re.M | re.S) == re.findall(pattern, source, re.M | re.S)
+    for pattern in (r"`(slipstand [^`]*)`", r"^\|", r"^- ", r"\*\*(?:[A-Z]|Enter|Esc|Del|F2|Ctrl\+Z)\*\*"):
+        assert len(re.findall(pattern, text, re.M)) == len(re.findall(pattern, source, re.M)), pattern
+
+
+def test_a_changed_section_of_a_source_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in (*translated_pages.SOURCES.values(), "ru/first-test.md"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text((translated_pages.DOCS / name).read_text("utf-8"), "utf-8")
+    monkeypatch.setattr(translated_pages, "DOCS", tmp_path)
+    page = tmp_path / "ru" / "first-test.md"
+    assert translated_pages.faults(page) == []
+    source = tmp_path / "tutorial" / "first-test.md"
+    source.write_text(source.read_text("utf-8").replace("opens the window", "shows the window"), "utf-8")
+    (fault,) = translated_pages.faults(page)
+    assert "section 'In the window'" in fault

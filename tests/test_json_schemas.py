@@ -5,9 +5,13 @@ import json
 import jsonschema
 import msgspec
 import pytest
+import typer
+from schema_kit import check, closed, schema_name
+from typer.core import TyperGroup
 
 from analysis.synthetic import Truth, simulate_readings
 from app.acquisition.messages import EndReason, RunEnded
+from app.cli.commands import app
 from app.cli.record import run_document
 from tools.json_schemas import FOLDER, SCHEMAS, schema_text
 
@@ -26,18 +30,38 @@ def run(slipstand, folder):
     return path
 
 
-def check(name: str, document: object) -> None:
-    schema = SCHEMAS[name][1]
-    jsonschema.Draft202012Validator.check_schema(schema)
-    jsonschema.validate(document, schema, cls=jsonschema.Draft202012Validator)
-
-
 def test_the_published_schemas_are_current() -> None:
     assert {path.name for path in FOLDER.iterdir()} == {f"{name}.schema.json" for name in SCHEMAS}
     for name in SCHEMAS:
+        jsonschema.Draft202012Validator.check_schema(SCHEMAS[name][1])
+        jsonschema.Draft202012Validator.check_schema(closed(SCHEMAS[name][1]))
         assert (FOLDER / f"{name}.schema.json").read_text("utf-8") == schema_text(name), (
             "run python -m tools.json_schemas"
         )
+
+
+def test_each_command_with_json_has_a_schema() -> None:
+    """Tests of the commands hold what they print against it: `Outcome.json`."""
+
+    def commands(command, words):
+        if isinstance(command, TyperGroup):
+            context = typer.Context(command)
+            for name in command.list_commands(context):
+                yield from commands(command.get_command(context, name), (*words, name))
+        if any("--json" in param.opts for param in command.params):
+            yield words
+
+    names = {schema_name((*words, "--json")) for words in commands(typer.main.get_command(app), ())}
+    assert names | {"demo-campaign"} == set(SCHEMAS)
+    assert schema_name(("demo", "--campaign", "--json")) == "demo-campaign"
+
+
+def test_a_key_that_a_schema_lacks_is_refused() -> None:
+    document = {"port": "COM3", "protocol": "gsv", "rate_hz": 1.0, "series": "1FFM0"}
+    document |= {"truth_file": None, "calibration": None}
+    check("device-simulate", document)
+    with pytest.raises(jsonschema.ValidationError, match="unexpected"):
+        check("device-simulate", document | {"more": 1})
 
 
 @pytest.mark.parametrize(

@@ -24,7 +24,7 @@ def run() -> None:
         _use_utf8(stream)
     start_log("command")
     try:
-        app()
+        app(prog_name="slipstand")
     except SystemExit as ended:
         of_typer = getattr(ended.__context__, "__cause__", None)
         if was_interrupted() or isinstance(of_typer, KeyboardInterrupt):
@@ -43,11 +43,22 @@ def run() -> None:
 def _use_utf8(stream: object) -> None:
     """Write files and pipes in UTF-8: Windows would use its code page, which has no Greek letters.
 
-    A terminal keeps its encoding, and PYTHONIOENCODING is followed.
+    A terminal keeps its encoding, and PYTHONIOENCODING is followed. Where the locale is named C or POSIX a
+    terminal is shown ASCII; Python would write UTF-8.
     """
     if isinstance(stream, io.TextIOWrapper):
-        is_chosen = stream.isatty() or bool(os.environ.get("PYTHONIOENCODING"))
-        stream.reconfigure(encoding=None if is_chosen else "utf-8", errors=_SPELLED)
+        if os.environ.get("PYTHONIOENCODING"):
+            encoding = None
+        elif stream.isatty():
+            encoding = "ascii" if _locale_name() in ("C", "POSIX") else None
+        else:
+            encoding = "utf-8"
+        stream.reconfigure(encoding=encoding, errors=_SPELLED)
+
+
+def _locale_name() -> str:
+    """Name of the locale of characters, as the user's environment has it; "" where it has none."""
+    return next(filter(None, map(os.environ.get, ("LC_ALL", "LC_CTYPE", "LANG"))), None) or ""
 
 
 _SPELLED = "slipstand-spelled"  # how `codecs` calls `_spell`

@@ -1,5 +1,7 @@
 """`slipstand audit`: whether a published table agrees with itself and with the equations of motion."""
 
+from dataclasses import asdict
+
 import msgspec
 
 from analysis.audit import AuditedRow, PublishedRow, count_flags
@@ -20,7 +22,10 @@ def audit(options: AuditOptions) -> None:
         gravity_m_per_s2=stand.gravity_m_per_s2,
     )
     if options.as_json:
-        rows_found = [{"series": row.series, "flags": row.flags} for row in audited]
+        rows_found = [
+            {"series": row.series, "flags": row.flags, "checks": [asdict(check) for check in row.checks]}
+            for row in audited
+        ]
         out.print_json({"rows": rows_found, "counts": count_flags(audited)})
     else:
         _print_report(audited)

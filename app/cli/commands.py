@@ -1,25 +1,56 @@
 """The commands of `slipstand`. A command's module is imported when the command runs."""
 
 from importlib import import_module
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, Final, NamedTuple
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperArgument, TyperGroup
 
 from app.cli.options import command_function
 from app.log import start_log
 from app.version import version_text
 
-_EXAMPLES = {
+_EXAMPLES: Final = {
+    "demo:demo": "demo --series 1SSM1 --friction 0.13",
     "record:record": "record --port /dev/ttyUSB0 --protocol csv --series 1FFM0",
+    "analyze:analyze": "analyze recordings --save",
     "simulate:simulate": "simulate --series 1FFM0 --friction 0.12 -o motion.csv",
     "plan:plan": "plan --series 1FFM0 --pullback 0.008 --rate 500",
     "import_record:import_record": "import test.csv --time t --table u1 --relative u2 --unit mm"
     " --series 1FFM0 -o test.h5",
     "watch:watch": "watch incoming --time t --table u1 --relative u2 --unit mm --series 1FFM0"
     " --write-table table.xlsx",
+    "export:export": "export recordings --content coefficients -o results.xlsx",
+    "table:table": "table recordings --format csv -o table.csv",
+    "figures:figures": "figures recordings --format pdf -o figures",
+    "report:report": 'report recordings --laboratory "Institute of Mechanics" -o report.pdf',
+    "runs:runs": "runs --series 1FFM0 --since 2026-11-21 --sort f_d",
+    "recover:recover": "recover recordings",
+    "edit:edit": "edit run.h5 --plate-mass 22.5 --condition plate_id=P1",
+    "runs:trash": "trash run.h5",
+    "audit:audit": "audit table.csv",
+    "doctor:doctor": "doctor --bundle findings.zip",
+    "calibrate:calibrate": "calibrate --gauge table --points readings.csv --dial-uncertainty 0.003",
+    "calibration_check:check": "calibrate check --gauge table --port /dev/ttyUSB0 --protocol csv"
+    " --displacement 10 --uncertainty 0.002",
+    "device:list_devices": "device list",
+    "device:list_ports": "device ports",
+    "device:probe": "device probe /dev/ttyUSB0 --write",
+    "simulate_device:simulate_device": "device simulate --protocol gsv --series 1FFM0 --tcp 5000",
+    "health:health": "device health --port /dev/ttyUSB0 --protocol csv",
 }
 """Shown below the help of a command, by its target."""
+
+
+class _Argument(TyperArgument):
+    """An argument that is shown by what is to be given alone: `RUN`, without braces and a Python type."""
+
+    def get_usage_pieces(self, ctx: Any) -> list[str]:  # noqa: ARG002 - as Click calls it
+        return [f"{self.metavar if self.required else f'[{self.metavar}]'}{'...' if self.nargs != 1 else ''}"]
+
+    def get_help_record(self, ctx: Any) -> tuple[str, str] | None:
+        record = super().get_help_record(ctx)
+        return record and (str(self.metavar), record[1])
 
 
 class CommandEntry(NamedTuple):
@@ -32,15 +63,18 @@ class CommandEntry(NamedTuple):
     group: type[TyperGroup] | None = None  # group of the commands below this one
 
     def load(self) -> Any:
-        example = _EXAMPLES.get(self.target)
+        example = f"\b\nExample: slipstand {_EXAMPLES[self.target]}"  # \b: it is not wrapped
         function = command_function(_load(self.options), self._run)
         commands = _typer()
         if self.group:
-            commands.callback(cls=self.group, invoke_without_command=True)(function)
+            commands.callback(cls=self.group, invoke_without_command=True, epilog=example)(function)
         else:
-            commands.command(self.name, epilog=example and f"Example: slipstand {example}")(function)
+            commands.command(self.name, epilog=example)(function)
         command = typer.main.get_command(commands)
         command.name = self.name
+        for param in command.params:
+            if isinstance(param, TyperArgument):
+                param.__class__ = _Argument
         return command
 
     def _run(self, options: Any) -> None:
@@ -114,15 +148,17 @@ class DeviceGroup(LazyGroup):
 
 def _typer(**settings: Any) -> typer.Typer:
     return typer.Typer(
-        pretty_exceptions_enable=False, add_completion=False, rich_markup_mode=None, **settings
+        **{"pretty_exceptions_enable": False, "add_completion": False, "rich_markup_mode": None} | settings
     )
 
 
 app = _typer(
     cls=SlipstandGroup,
+    add_completion=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
     help="Measures dry friction on a shaking stand. "
-    "`slipstand` alone opens the window, `slipstand --simulated` opens it on the simulated stand, "
-    "`slipstand FILE.h5` on a run.",
+    "`slipstand` alone opens the window, `slipstand RUN.h5` opens a run in it, `slipstand --simulated` opens"
+    " it on the simulated stand.",
 )
 app.add_typer(
     _typer(cls=DeviceGroup, help="Devices, ports and the simulated stand.", no_args_is_help=True),
@@ -140,7 +176,7 @@ def _show_version(wanted: bool) -> None:
 def main_options(
     version: Annotated[  # noqa: ARG001 - its callback shows it
         bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and commit."),
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Show version and commit."),
     ] = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Write the log in detail, and to stderr as well.")

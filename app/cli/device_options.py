@@ -32,7 +32,7 @@ class ProbeOptions:
     Shows how to record from each, what is plugged in, and which program has it open.
     """
 
-    ports: list[str] | None = argument("Ports or URLs; all serial ports if absent.", None)
+    ports: list[str] | None = argument("Ports or URLs; all serial ports if absent.", None, metavar="PORT")
     write: bool = flag("--write", "Send an identity query to silent devices; else nothing is sent.")
     as_json: bool = shared.as_json()
 

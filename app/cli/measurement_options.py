@@ -128,7 +128,7 @@ class PlanOptions:
     last_runs: Path | None = option(
         "--last-runs",
         "Folder of runs whose kept results tell the stand's effects; that of recordings if absent.",
-        metavar="DIR",
+        metavar="FOLDER",
     )
     ideal_stand: bool = flag("--ideal-stand", "Leave out what the last runs show of the stand.")
     as_json: bool = shared.as_json()

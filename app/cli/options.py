@@ -5,17 +5,28 @@ A command declares its options in a dataclass: a field is an option (`option`, `
 nothing of what the command does.
 """
 
+import copy
 import dataclasses
+import datetime
 import inspect
 import math
-from collections.abc import Callable, Iterator
-from typing import Annotated, Any, Final, get_type_hints
+import re
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from typing import Annotated, Any, Final, get_args, get_type_hints
 
 import typer
 
 from app.cli.errors import CommandError, alternatives
 
 REQUIRED: Final[Any] = dataclasses.MISSING  # default of an option that must be given
+_METAVARS: Final = {
+    "--author": "NAME", "--begun": "TIME", "--by": "NAME", "--column": "NAME", "--operator": "NAME",
+    "--port": "URL", "--protocol": "NAME", "--relative-port": "URL", "--series": "CODE", "--since": "DATE",
+}  # fmt: skip
+"""What stands for the value of an option in `--help`, where neither its unit nor its type tells."""
+_UNIT: Final = re.compile(r"\((m/s|mm|m|kg/s|kg|s|Hz|1/s|N/m|rad|ppm|%|degrees C)\)")
+_UNIT_IN_WORDS: Final = (("amples a second", "HZ"), ("ows a second", "HZ"), ("econds", "S"))
 
 
 def option(names: str, description: str, default: Any = None, **settings: Any) -> Any:
@@ -41,7 +52,18 @@ def choice(name: str, values: tuple[str, ...], description: str, default: Any = 
             raise CommandError(f"{name} {text!r} is not known. Use {alternatives(values)}")
         return text
 
-    return option(name, description, default, parser=parse, metavar=f"[{'|'.join(values)}]")
+    settings = {"parser": parse, "metavar": f"[{'|'.join(values)}]", "autocompletion": completion(values)}
+    return option(name, description, default, **settings)
+
+
+def completion(values: Iterable[str] | Callable[[], Iterable[str]]) -> Callable[[str], list[str]]:
+    """Return what completes a value in a shell. A function gives the values when they are asked for."""
+
+    def complete(incomplete: str) -> list[str]:
+        known = values() if callable(values) else values
+        return [value for value in known if value.startswith(incomplete)]
+
+    return complete
 
 
 def number(
@@ -63,7 +85,7 @@ def number(
         limit = limit if above == -math.inf else f" above {above:g}"
         raise CommandError(f"{name} {value:g} must be a finite number{limit}")
 
-    return option(name, description, default, parser=parse, metavar="INTEGER" if integer else "FLOAT")
+    return option(name, description, default, parser=parse)
 
 
 def option_names(options: type[Any]) -> dict[str, str]:
@@ -114,5 +136,31 @@ def _parameters(options: Any) -> Iterator[inspect.Parameter]:
             field.name,
             inspect.Parameter.KEYWORD_ONLY,
             default=empty if field.default is REQUIRED else field.default,
-            annotation=Annotated[hint, field.metadata["typer"]],
+            annotation=Annotated[hint, _with_metavar(field.metadata, hint)],
         )
+
+
+def _with_metavar(declared: Any, hint: Any) -> Any:
+    """Return the declaration of an option with a name for its value, which `--help` shows."""
+    declaration = declared["typer"]
+    if declaration.metavar or not declared["names"]:
+        return declaration
+    declaration = copy.copy(declaration)
+    declaration.metavar = _metavar(declared["names"].split()[-1], declaration.help, hint)
+    return declaration
+
+
+def _metavar(name: str, description: str, hint: Any) -> str | None:
+    """`KG`, `CODE`, `DATE`: what is to be given. None for a flag."""
+    types = {hint, *get_args(hint), *(inner for one in get_args(hint) for inner in get_args(one))}
+    if bool in types:
+        return None
+    if datetime.datetime in types:
+        return "DATE"
+    if Path in types:
+        return "FOLDER" if description.startswith("Folder") else "FILE"
+    if float in types:
+        if unit := _UNIT.search(description):
+            return {"%": "PERCENT", "degrees C": "CELSIUS"}.get(unit[1], unit[1].upper())
+        return next((unit for words, unit in _UNIT_IN_WORDS if words in description), "NUMBER")
+    return "N" if int in types else _METAVARS.get(name, "TEXT")

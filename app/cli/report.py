@@ -1,19 +1,23 @@
 """`slipstand report`: a test report to sign, as PDF."""
 
 import datetime
+from typing import Final
+
+import msgspec
 
 from app.cli import output as out
 from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError
 from app.cli.result_options import ReportOptions
 from app.reports.table.text import TableContent
-from app.reports.test_report.build import TITLE, ReportHead, build_report
+from app.reports.test_report.build import build_report
+from app.reports.test_report.head import ReportHead, read_head
 from app.reports.test_report.render import write_report
 from app.runs.campaign.origin import campaign_command
 
 
 def report(options: ReportOptions) -> None:
-    head = _head(options.date, options.title, options.laboratory)
+    head = _head(options)
     target = out.output_file(options.output, options.force, (".pdf",))
     runs = load_campaign(options.paths, options.jobs, exclude=options.exclude)
     if not runs.runs:
@@ -25,7 +29,13 @@ def report(options: ReportOptions) -> None:
     if options.as_json:
         failures = [{"run": run, "error": error} for run, error in content.failures]
         names = [run.name for run in runs.runs]
-        document = {"report": str(target), "date": made.date, "runs": names, "failures": failures}
+        document = {
+            "report": str(target),
+            "number": made.number,
+            "date": made.date,
+            "runs": names,
+            "failures": failures,
+        }
         out.print_json(document | {"origin": content.origin.document()})
     else:
         out.print_line(str(target))
@@ -35,15 +45,24 @@ def report(options: ReportOptions) -> None:
 def _reproduce(options: ReportOptions, head: ReportHead) -> str:
     """Command that gives the same report, of the runs as they are."""
     words = ["--date", head.date.isoformat()]
-    words += ["--title", options.title] if options.title else []
-    words += ["--laboratory", options.laboratory] if options.laboratory else []
+    for name in _OF_HEAD:
+        words += [f"--{name}", text] if (text := getattr(options, name)) else []
     words += [word for run in options.exclude or () for word in ("--exclude", run)]
     return campaign_command("report", options.paths, ["-o", "REPORT.pdf", *words])
 
 
-def _head(date: str, title: str, laboratory: str) -> ReportHead:
+def _head(options: ReportOptions) -> ReportHead:
+    """Head of the report: what the options say, else the settings.
+
+    Raises CommandError, ConfigError, RunError.
+    """
     try:
-        day = datetime.date.fromisoformat(date) if date else datetime.datetime.now().astimezone().date()
+        today = datetime.datetime.now().astimezone().date()
+        day = datetime.date.fromisoformat(options.date) if options.date else today
     except ValueError:
-        raise CommandError(f"--date {date!r} is no date. Write it as 2026-11-21") from None
-    return ReportHead(day, title.strip() or TITLE, laboratory.strip())
+        raise CommandError(f"--date {options.date!r} is no date. Write it as 2026-11-21") from None
+    given = {name: text for name in _OF_HEAD if (text := getattr(options, name).strip())}
+    return msgspec.structs.replace(read_head(day), **given)
+
+
+_OF_HEAD: Final = ("title", "number", "laboratory", "customer", "method")

@@ -124,6 +124,7 @@ class FiguresOptions:
     figure: list[str] | None = option(
         "--figure",
         "Only this figure: 2, 3a, 3b, 4a, 4b, 5a, 5b, fd-velocity, fd-position or fd-time; repeatable.",
+        metavar="FIGURE",
     )
     jobs: JobOptions
     force: bool = shared.force()
@@ -140,9 +141,12 @@ class ReportOptions:
 
     paths: list[Path] = shared.runs_or_folders()
     output: Path = option("-o --output", "PDF file to write.", REQUIRED)
-    date: str = option("--date", "Date of the report; today if absent.", "", metavar="YYYY-MM-DD")
+    date: str = option("--date", "Date of the report; today if absent.", "", metavar="DATE")
     title: str = option("--title", "Title of the report.", "")
-    laboratory: str = option("--laboratory", "Who issues it.", "")
+    laboratory: str = option("--laboratory", "Who issues it; as in settings.toml if absent.", "")
+    customer: str = option("--customer", "Whom it is for.", "")
+    number: str = option("--number", "Number of the report; of its date and inputs if absent.", "")
+    method: str = option("--method", "Method of test with its reference; the paper's if absent.", "")
     exclude: list[str] | None = shared.exclude()
     jobs: JobOptions
     force: bool = shared.force()
@@ -156,5 +160,7 @@ class AuditOptions:
     Each row is checked for stiffness, damping, velocity, acceleration, breakaway and residual.
     """
 
-    table: Path | None = argument("CSV with Table 1's columns; the paper's if absent.", None)
+    table: Path | None = argument(
+        "CSV with Table 1's columns; the paper's if absent.", None, metavar="TABLE.csv"
+    )
     as_json: bool = shared.as_json()

@@ -7,16 +7,26 @@ from app.cli import shared_options as shared
 from app.cli.options import REQUIRED, argument, choice, flag, number, option
 from app.cli.shared_options import ConditionOptions, MassOptions
 
+RUN_COLUMNS = (
+    "run", "series", "begun", "seconds", "ended", "source", "f_d", "T", "n1", "operator", "plate", "note",
+    "conditions", "fault",
+)  # fmt: skip
+"""Of `slipstand runs`."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class FileOptions:
     """How the file is read: the fields of `ImportPlan` and of its layout."""
 
     time: str | None = option(
-        "--time", "Time column: its name or number, from 0; found by its name or kind if absent."
+        "--time",
+        "Time column: its name or number, from 0; found by its name or kind if absent.",
+        metavar="COLUMN",
     )
     rate: float | None = option("--rate", "Rows a second, of a file without times; instead of --time.")
-    date: str | None = option("--date", "Column of dates, where --time is one of times of day.")
+    date: str | None = option(
+        "--date", "Column of dates, where --time is one of times of day.", metavar="COLUMN"
+    )
     date_order: str | None = choice(
         "--date-order", ("dmy", "mdy", "ymd"), "Order of day and month in dates; detected if absent."
     )
@@ -24,9 +34,9 @@ class FileOptions:
         "--begun",
         "When the file's first row was recorded: 2019-05-04T14:03:00+02:00; as the file says if absent.",
     )
-    table: str = option("--table", "Column of gauge 1, table against base.", REQUIRED)
-    relative: str | None = option("--relative", "Column of gauge 2, plate against table.")
-    plate: str | None = option("--plate", "Column of gauge 2, plate against base.")
+    table: str = option("--table", "Column of gauge 1, table against base.", REQUIRED, metavar="COLUMN")
+    relative: str | None = option("--relative", "Column of gauge 2, plate against table.", metavar="COLUMN")
+    plate: str | None = option("--plate", "Column of gauge 2, plate against base.", metavar="COLUMN")
     unit: str | None = choice(
         "--unit", ("m", "mm", "um"), "Length unit of the cells; as the file names it, else m, if absent."
     )
@@ -34,7 +44,7 @@ class FileOptions:
         "--gain", "Metres, or --unit-name, that a cell of 1 means; instead of --unit."
     )
     offset: float | None = option("--offset", "Metres, or --unit-name, that a cell of 0 means; with --gain.")
-    unit_name: str | None = option("--unit-name", "Unit of the readings, where not metres.")
+    unit_name: str | None = option("--unit-name", "Unit of the readings, where not metres.", metavar="UNIT")
     gain_uncertainty: float | None = option(
         "--gain-uncertainty", "Relative standard uncertainty of the gain; not stated if absent."
     )
@@ -44,9 +54,13 @@ class FileOptions:
     time_unit: str | None = choice(
         "--time-unit", ("s", "ms", "us"), "Unit of the times; as the file names it, else s, if absent."
     )
-    delimiter: str | None = option("--delimiter", "A character, tab or space; detected if absent.")
+    delimiter: str | None = option(
+        "--delimiter", "A character, tab or space; detected if absent.", metavar="SIGN"
+    )
     decimal: str | None = choice("--decimal", (".", ","), "Decimal sign; detected if absent.")
-    encoding: str | None = option("--encoding", "Of a text: utf-8, cp1251, ...; detected if absent.")
+    encoding: str | None = option(
+        "--encoding", "Of a text: utf-8, cp1251, ...; detected if absent.", metavar="NAME"
+    )
     missing: list[str] | None = option(
         "--missing",
         "A cell of an absent reading, besides nan, N/A, - and the like; repeatable.",
@@ -71,7 +85,7 @@ class ImportOptions:
     Times are kept, uneven ones and gaps included.
     """
 
-    files: list[Path] = argument("Files of other programs, or patterns such as *.csv.", metavar="FILE...")
+    files: list[Path] = argument("Files of other programs, or patterns such as *.csv.", metavar="FILE")
     output: Path = option("-o --output", "Run file to write, RUN.h5; of several files a folder.", REQUIRED)
     source: FileOptions
     masses: MassOptions
@@ -93,7 +107,9 @@ class WatchOptions:
     folder: Path = argument("Folder that files arrive in.", metavar="FOLDER")
     output: Path | None = option("-o --output", "Folder of the runs; FOLDER/runs if absent.")
     pattern: list[str] | None = option(
-        "--pattern", "Names of the files to take, such as *.csv; repeatable; all that can be read if absent."
+        "--pattern",
+        "Names of the files to take, such as *.csv; repeatable; all that can be read if absent.",
+        metavar="PATTERN",
     )
     source: FileOptions
     masses: MassOptions
@@ -139,16 +155,21 @@ class ExportOptions:
 class ListRunsOptions:
     """List recorded runs, oldest first.
 
-    Files that cannot be read stand last with their fault.
+    Files that cannot be read stand last with their fault. Paths below the present folder are relative to it.
     """
 
-    directory: Path | None = argument("Folder of runs; that of recordings if absent.", None, metavar="[DIR]")
+    directory: Path | None = argument("Folder of runs; that of recordings if absent.", None, metavar="FOLDER")
     series: str | None = shared.series()
     since: str | None = option("--since", "Only runs of this day or later: 2026-11-21.")
-    until: str | None = option("--until", "Only runs of this day or earlier.")
+    until: str | None = option("--until", "Only runs of this day or earlier.", metavar="DATE")
     operator: str | None = option("--operator", "Only runs of this operator.")
     text: str | None = option("--text", "Only runs with this in name, title, note, operator or source.")
     stale: bool = flag("--stale", "Only runs changed since their newest analysis.")
+    columns: str | None = option(
+        "--columns", f"Columns to show, of {', '.join(RUN_COLUMNS)}.", metavar="NAME,NAME..."
+    )
+    sort: str | None = choice("--sort", RUN_COLUMNS, "Column to sort by; oldest first if absent.")
+    reverse: bool = flag("--reverse", "In the reverse order; runs without a value stay last.")
     as_json: bool = shared.as_json()
 
 
@@ -157,7 +178,7 @@ class RecoverOptions:
     """Rebuild runs that a crash cut short, from their journals."""
 
     directory: Path | None = argument(
-        "Folder of runs; if absent, the recordings folder and where journals move to.", None, metavar="[DIR]"
+        "Folder of runs; if absent, the recordings folder and where journals move to.", None, metavar="FOLDER"
     )
     as_json: bool = shared.as_json()
 
@@ -197,7 +218,7 @@ class TrashOptions:
     The trash is the folder .trash beside them.
     """
 
-    runs: list[Path] | None = argument("Run files; with --list, a folder.", None, metavar="[RUN...]")
+    runs: list[Path] | None = argument("Run files; with --list, a folder.", None, metavar="RUN")
     bring_back: bool = flag("--restore", "Bring runs back from the trash.")
     show: bool = flag("--list", "Show what is in the trash.")
 

@@ -1,16 +1,30 @@
 """Options that several commands share, and groups of them."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 
-from app.cli.options import REQUIRED, argument, choice, flag, number, option
+from app.cli.options import REQUIRED, argument, choice, completion, flag, number, option
 from app.simulated_stand.effects import LISTED
+from config.files import load_stand
+from drivers.registry import AVAILABLE
 
-run_files = partial(argument, "Run files.", metavar="RUN...")
-runs_or_folders = partial(argument, "Run files, or folders of runs.", metavar="RUN|DIR...")
+
+def _series_codes() -> Iterable[str]:
+    return load_stand().all_series
+
+
+def _protocols() -> Iterable[str]:
+    return (driver.name for driver in AVAILABLE)
+
+
+run_files = partial(argument, "Run files.", metavar="RUN")
+runs_or_folders = partial(argument, "Run files, or folders of runs.", metavar="RUN|FOLDER")
 as_json = partial(flag, "--json", "One JSON document on stdout, nothing else there.")
 force = partial(flag, "--force", "Overwrite an existing output file.")
-series = partial(option, "--series", "Series code, for example 1FFM0.")
+series = partial(
+    option, "--series", "Series code, for example 1FFM0.", autocompletion=completion(_series_codes)
+)
 directory = partial(option, "--directory", "Folder of the runs; the recordings folder if absent.")
 exclude = partial(option, "--exclude", "A run to leave out, and why; repeatable.", metavar="RUN[=REASON]")
 calibration = partial(option, "--calibration", "Calibration file; gauges.toml if absent.")
@@ -72,7 +86,12 @@ class DeviceOptions(LinkOptions):
     """Which device to read."""
 
     port: str = option("--port", "Port or URL: /dev/ttyUSB0, COM3, socket://host:port, lsl://NAME.", REQUIRED)
-    protocol: str = option("--protocol", "Protocol name, see `slipstand device list`.", REQUIRED)
+    protocol: str = option(
+        "--protocol",
+        "Protocol name, see `slipstand device list`.",
+        REQUIRED,
+        autocompletion=completion(_protocols),
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

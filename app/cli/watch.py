@@ -17,7 +17,8 @@ from app.cli.import_record import import_document, import_metadata, import_plan,
 from app.cli.run_file_options import WatchOptions
 from app.reports.table.files import write_table
 from app.reports.table.text import TableContent
-from app.reports.test_report.build import ReportHead, build_report
+from app.reports.test_report.build import build_report
+from app.reports.test_report.head import read_head
 from app.reports.test_report.render import write_report
 from app.runs.analysis_json import read_quantity
 from app.runs.analysis_request import AnalysisRequest
@@ -108,7 +109,7 @@ class FolderWatch:
         today = datetime.datetime.now().astimezone().date()
         words = ["-o", path.name, "--date", today.isoformat()]
         content = TableContent.of_runs(runs, campaign_command("report", self.analysed, words))
-        write_report(build_report(runs, content, ReportHead(today)), path, replace=True)
+        write_report(build_report(runs, content, read_head(today)), path, replace=True)
 
 
 def watch(options: WatchOptions) -> None:

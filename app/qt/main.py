@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from PySide6.QtCore import QLibraryInfo, QLocale, QTimer, QTranslator
@@ -29,12 +30,14 @@ _INTERRUPTED = 130
 _ICON = Path(__file__).with_name("slipstand.svg")
 
 
-def run_window(simulated: bool = False, run: str | None = None, series: str = "1FFM0") -> int:
+def run_window(simulated: bool = False, series: str = "1FFM0", run: str = "") -> int:
     """Open the window, and return the exit code when it has been closed.
 
     0 closed; 1 could not open, with one line on stderr; 130 closed by Ctrl-C or SIGTERM. With `simulated` it
-    connects at once to a simulated stand that runs `series`; it opens `run`, the path of a run file.
+    connects at once to a simulated stand that runs `series`; with `run` it shows that run file on Identify.
     """
+    if run and not Path(run).is_file():
+        return _refuse(f"{run}: there is no such file. Give a run file, or a command: slipstand --help")
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
     errors, personal = ErrorReporter(), read_personal()
@@ -54,7 +57,13 @@ def run_window(simulated: bool = False, run: str | None = None, series: str = "1
         return _refuse(str(error))
     window = MainWindow(theme, presenter, _load_layout(errors))
     window.closed.connect(lambda layout: _save_layout(layout, errors))
-    code = _run(app, window, presenter, _first_screen(window, presenter, series if simulated else None, run))
+    if run:
+        first = partial(presenter.open_run, run)
+    elif simulated:
+        first = partial(presenter.open_simulated, series)
+    else:
+        first = None
+    code = _run(app, window, presenter, first)
     while (late := errors.next_report()) is not None:
         sys.stderr.write(f"error: {translate(late.message)}\n")
     return code
@@ -93,30 +102,17 @@ def _save_layout(layout: WindowLayout, errors: ErrorReporter) -> None:
         errors.report(error_report(error))
 
 
-def _first_screen(
-    window: MainWindow, presenter: WindowPresenter, simulated: str | None, run: str | None
-) -> Callable[[], None]:
-    """What the window shows at first: the simulated stand, a run, or the screen that was left."""
-
-    def show_soon() -> None:
-        if simulated is not None:
-            QTimer.singleShot(0, window, lambda: presenter.open_simulated(simulated))
-            return
-        if run is None:
-            window.show_last_screen_soon()
-        else:
-            QTimer.singleShot(0, window, lambda: presenter.open_run(run))
-        QTimer.singleShot(0, window, presenter.connect_at_start)
-
-    return show_soon
-
-
 def _run(
-    app: QApplication, window: MainWindow, presenter: WindowPresenter, show_soon: Callable[[], None]
+    app: QApplication, window: MainWindow, presenter: WindowPresenter, first: Callable[[], None] | None
 ) -> int:
+    """Show the window until it is closed; `first` is called once it is there."""
     interrupts = _close_on_interrupt(presenter)
     window.show()
-    show_soon()
+    if first is None:
+        window.show_last_screen_soon()
+        QTimer.singleShot(0, window, presenter.connect_at_start)
+    else:
+        QTimer.singleShot(0, window, first)
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
     QTimer.singleShot(0, window, presenter.ask_to_recover)
     code = app.exec()

@@ -107,7 +107,7 @@ def test_results_are_shown_as_text_table_and_figure(result) -> None:
     frame = result.to_dataframe()
     assert frame.loc["period_s", "value"] == result["period_s"].value
     assert frame.loc["period_s", "low_95"] == result["period_s"].interval_95[0]
-    assert len(result.plot().axes) == 3
+    assert len(result.plot().axes) == 4  # residuals of each gauge have a panel
 
 
 def test_correlations_are_those_of_repeated_tests() -> None:

@@ -9,7 +9,8 @@ from app.presenters.campaign.tasks import collected_runs
 from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
 from app.reports.table.files import write_table
 from app.reports.table.text import TableContent
-from app.reports.test_report.build import TITLE, ReportHead, build_report
+from app.reports.test_report.build import build_report
+from app.reports.test_report.head import read_head
 from app.reports.test_report.render import write_report
 from app.runs.campaign.collect import CollectedRuns
 from app.runs.campaign.origin import campaign_command
@@ -37,7 +38,7 @@ def write_product(
         name = _TABLE_FORMATS.get(target.suffix.lower(), "text")
         write_table(content, target, name, with_repeats=True, replace=True)
     else:
-        head = ReportHead(datetime.datetime.now().astimezone().date(), TITLE, "")
+        head = read_head(datetime.datetime.now().astimezone().date())
         write_report(build_report(runs, content, head), target, replace=True)
     return (str(target),)
 

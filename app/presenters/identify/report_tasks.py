@@ -4,7 +4,8 @@ import datetime
 from pathlib import Path
 
 from app.reports.test_report.blocks import Report
-from app.reports.test_report.build import ReportHead, build_run_report
+from app.reports.test_report.build import build_run_report
+from app.reports.test_report.head import read_head
 from app.reports.test_report.render import render_pages, write_report
 
 _PRINTED_DPI = 300.0
@@ -22,4 +23,4 @@ def render_run_report(path: str) -> list[bytes]:
 
 
 def _report(path: str) -> Report:
-    return build_run_report(Path(path), ReportHead(datetime.datetime.now().astimezone().date()))
+    return build_run_report(Path(path), read_head(datetime.datetime.now().astimezone().date()))

@@ -49,7 +49,7 @@ def _draw_rich(painter: QPainter, place: QRect, rich: str, of: QHeaderView, side
     document = QTextDocument()
     document.setDocumentMargin(0)
     document.setDefaultFont(of.font())
-    colour = of.palette().color(QPalette.ColorRole.ButtonText).name()
+    colour = of.palette().color(QPalette.ColorRole.PlaceholderText).name()  # that of the style sheet
     lines = rich.replace("\n", "<br>")
     document.setHtml(
         f'<div align="{"right" if side & Qt.AlignmentFlag.AlignRight else "left"}">'

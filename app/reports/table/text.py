@@ -15,6 +15,7 @@ from analysis.catalogue import Place, QuantityDefinition, table_columns
 from analysis.formatting import (
     format_concise,
     format_fixed,
+    format_interval,
     format_signed,
     format_value,
     uncertainty_decimals,
@@ -132,7 +133,7 @@ _UNBROKEN: Final = "\u00a0%"
 _SAID, _NAMED = 3, 12  # series for which a warning is printed in full, and that are named
 LEGEND: Final = (
     "In parentheses: standard uncertainty of the last digits. * a run is far from the others, ! no friction"
-    " law explains a run."
+    " law explains a run. f_s without parentheses: the runs only bound it."
 )
 REPEATS_LEGEND: Final = (
     "Standard deviation of the runs in percent of the mean, and Birge ratio (1: the runs scatter as their"
@@ -231,7 +232,7 @@ def ratio_sentence(ratio: ContactRatio) -> str:
     parts = []
     if ratio.ratio is not None:
         number = format_concise(ratio.ratio.value, ratio.ratio.standard_uncertainty)
-        ends = " to ".join(f"{end:.3g}" for end in ratio.ratio.interval_95)
+        ends = format_interval(*ratio.ratio.interval_95)
         between = ratio.between_series
         spread = "" if between is None else f" with a standard deviation of {between:.2g}"
         parts.append(f"{number} (95 %: {ends}) over {ratio.series} series{spread}")

@@ -83,10 +83,19 @@ class Section(msgspec.Struct, frozen=True):
     wide: bool = False
 
 
+class Logo(msgspec.Struct, frozen=True):
+    """Picture of the laboratory that issues a report."""
+
+    format: str  # png, jpg or svg
+    data: list[int]  # its bytes, as JSON has them
+
+
 class Report(msgspec.Struct, frozen=True):
     title: str
     subtitle: str
-    laboratory: str  # "" where unknown
+    head: list[tuple[str, str]]  # number, laboratory, customer, method; without what is unknown
+    logo: Logo | None
+    number: str  # on every page
     date: str  # ISO date of the report, the only difference between two reports of the same runs
     software: str
     sections: list[Section]

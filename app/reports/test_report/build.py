@@ -1,17 +1,16 @@
 """Building of a report from run files: of one run, or of a campaign."""
 
-import datetime
 import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-import msgspec
-
 from app.reports.figures.figure_files import representative_runs
 from app.reports.table.text import TableContent
+from app.reports.test_report import shared
 from app.reports.test_report.blocks import Report, Section
 from app.reports.test_report.campaign_report import CampaignReportInput, campaign_sections
+from app.reports.test_report.head import ReportHead
 from app.reports.test_report.run_report import run_sections
 from app.runs.analysis_request import quote_command
 from app.runs.analyze import repeat_saved_analysis
@@ -19,14 +18,6 @@ from app.runs.campaign.collect import CollectedRuns
 from app.runs.origin import program_document, software_text
 from app.runs.reader import compute_fingerprint
 from app.runs.validator import Validator
-
-TITLE = "Test report: dry friction by pullback"
-
-
-class ReportHead(msgspec.Struct, frozen=True):
-    date: datetime.date
-    title: str = TITLE
-    laboratory: str = ""
 
 
 def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHead) -> Report:
@@ -48,7 +39,7 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
             _folder([run.name for run in gathered.runs]),
         )
     subtitle = f"Campaign of {len(gathered.runs)} runs in {len(content.campaign.rows)} series"
-    return _report(head, subtitle, campaign_sections(material))
+    return _report(head.numbered(content.origin.inputs_hash), subtitle, campaign_sections(material))
 
 
 def build_run_report(path: Path, head: ReportHead) -> Report:
@@ -66,12 +57,22 @@ def _run_report(
     metadata = analysis.run.metadata
     subtitle = f"{metadata.series}, {path.name}" if metadata.series else path.name
     sections = run_sections(analysis, compute_fingerprint(path), reproduce, excluded or metadata.excluded)
-    return _report(head, subtitle, sections)
+    return _report(head.numbered(analysis.document["origin"]["inputs_hash"]), subtitle, sections)
 
 
 def _report(head: ReportHead, subtitle: str, sections: list[Section]) -> Report:
     software = software_text(program_document()).capitalize()
-    return Report(head.title, subtitle, head.laboratory, head.date.isoformat(), software, sections)
+    rows = [
+        ("report number", head.number),
+        ("date of issue", head.date.isoformat()),
+        ("laboratory", "\n".join(filter(None, (head.laboratory, head.address)))),
+        ("customer", head.customer),
+        ("method", head.method),
+    ]
+    stated = shared.without_empty(rows).rows
+    return Report(
+        head.title, subtitle, stated, head.logo, head.number, head.date.isoformat(), software, sections
+    )
 
 
 def _folder(names: Sequence[str]) -> str:

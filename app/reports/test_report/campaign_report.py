@@ -130,9 +130,13 @@ def _budget(material: CampaignReportInput) -> Iterator[blocks.Block]:
         parts = [
             "" if one is None else typeset(format_uncertainty(one)) for one in (pooled.repeatable, *shares)
         ]
-        rows.append([row.label, value, *parts])
-    note = "Standard uncertainties. Repeats reduce the noise and the scatter between runs, and nothing else."
-    header: list[Cell] = ["series", "value", "noise and repeats", *sources]
+        expanded = format_uncertainty(shared.COVERAGE_FACTOR * pooled.quantity.standard_uncertainty)
+        rows.append([row.label, value, typeset(expanded), *parts])
+    note = (
+        "Standard uncertainties, and U: expanded uncertainty, a coverage of about 95 %. Repeats reduce the"
+        " noise and the scatter between runs, and nothing else."
+    )
+    header: list[Cell] = ["series", "value", "U (k = 2)", "noise and repeats", *sources]
     yield blocks.Grid(header, rows, numbers=len(header) - 1, small=True, note=note)
 
 

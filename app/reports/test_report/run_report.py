@@ -111,7 +111,12 @@ def _result(found: Identification, unit: str) -> Iterator[blocks.Block]:
     text = f"{verdict[0].upper()}{verdict[1:]} (residual {residual}, noise {noise})."
     holds: Literal["warn", "bad"] = "warn" if found.model.degree is Degree.FRICTION else "bad"
     yield blocks.Conclusion(symbol, value, text, "ok" if found.model.adequate else holds)
-    yield Text(f"Standard uncertainty; the interval of 95 % coverage is {_interval(row, quantity)}.")
+    symbol_of_unit = row.unit_at(Place.REPORT, quantity.unit).symbol
+    expanded = f"{_expanded(row, quantity)} {symbol_of_unit}".rstrip()
+    yield Text(
+        f"± standard uncertainty. Expanded uncertainty U = {expanded} (k = 2, coverage of about 95 %); the"
+        f" interval of 95 % coverage is {_interval(row, quantity)}."
+    )
 
 
 def _test(analysis: Analysis) -> blocks.Facts:
@@ -188,11 +193,15 @@ def _results(found: Identification) -> Iterator[blocks.Block]:
             shown = row.format(quantity, Place.REPORT)
             uncertainty, unit = shown.uncertainty or "–", shown.unit or "1"
             symbol, interval = blocks.Symbol(row.symbol.markup), _interval(row, quantity)
-            rows.append([row.description, symbol, typeset(shown.value), uncertainty, interval, unit])
+            expanded = _expanded(row, quantity) if shown.uncertainty else "–"
+            rows.append(
+                [row.description, symbol, typeset(shown.value), uncertainty, expanded, interval, unit]
+            )
     if degree := found.labels.get("msk64_degree"):
-        rows.append(["seismic degree by the table's velocity", "MSK-64", str(degree), "", "", ""])
-    header: list[Cell] = ["quantity", "symbol", "value", "standard uncertainty", "95 % interval", "unit"]
-    yield blocks.Grid(header, rows, numbers=4)
+        rows.append(["seismic degree by the table's velocity", "MSK-64", str(degree), "", "", "", ""])
+    header: list[Cell] = ["quantity", "symbol", "value", "u", "U (k = 2)", "95 % interval", "unit"]
+    note = "u: standard uncertainty. U: expanded uncertainty, 2 u, a coverage of about 95 %."
+    yield blocks.Grid(header, rows, numbers=5, note=note)
     if found.plate is not None:
         yield Text(typeset_sentence(str(velocity_statement(found.plate))))
     if found.model is not None and found.model.tried:
@@ -209,6 +218,12 @@ def _interval(row: QuantityDefinition, quantity: Quantity) -> str:
     scale = row.unit_at(Place.REPORT, quantity.unit).scale
     low, high = quantity.interval_95
     return typeset(format_interval(low * scale, high * scale))
+
+
+def _expanded(row: QuantityDefinition, quantity: Quantity) -> str:
+    """Expanded uncertainty, k = 2, in the unit of the report."""
+    scale = row.unit_at(Place.REPORT, quantity.unit).scale
+    return typeset(format_uncertainty(shared.COVERAGE_FACTOR * quantity.standard_uncertainty * scale))
 
 
 def _budget(found: Identification) -> Iterator[blocks.Block]:
@@ -251,7 +266,10 @@ def _share(deviation: float | None, row: QuantityDefinition) -> str:
 
 
 def _figures(analysis: Analysis) -> list[blocks.Block]:
-    caption = "Record, simulation with the fitted parameters, and residuals. Shaded: slip."
+    caption = (
+        "Record, simulation with the fitted parameters, and residuals, over all that was fitted. Shaded:"
+        " slip. Hatched: not fitted, after the free decay. Red marks: absent or overloaded readings."
+    )
     unit = analysis.run.metadata.unit
     with print_style():
         whole = shared.drawing(record_figure(analysis.record, analysis.identification, unit), caption)

@@ -17,6 +17,8 @@ from app.runs.reader import Fingerprint
 from config.schema import Gauge, Gauges, Stand
 
 NOT_STATED = "not stated"
+COVERAGE_FACTOR: Final = 2.0
+"""Of expanded uncertainties (JCGM 100, 6.2)."""
 
 SIGNATURES: Final = Section("Signatures", [Signatures(["Tested by", "Checked by", "Approved by"])])
 PROCEDURE: Final = Section(
@@ -38,7 +40,9 @@ PROCEDURE: Final = Section(
         Text(
             "Uncertainties are standard uncertainties (coverage factor 1) by the law of propagation of"
             " JCGM 100: the noise of the readings as the residuals show it, and every stated uncertainty of"
-            " calibration, masses, gravity, time base and levelling. Intervals are those of 95 % coverage."
+            " calibration, masses, gravity, time base and levelling. Expanded uncertainties U are the"
+            " standard uncertainties times k = 2, a coverage of about 95 % where the distribution is normal."
+            " The 95 % intervals are those of the quantity's own distribution."
         ),
     ],
 )

@@ -71,6 +71,11 @@ class CampaignOrigin:
         which = f"{count} of {len(self.runs)} runs are" if len(self.runs) > 1 else "the run is"
         return f"{SIMULATED}: {which} of a simulated stand, not of a real one."
 
+    @property
+    def inputs_hash(self) -> str:
+        """Hash of requests and inputs of all results."""
+        return _inputs([details.origin for details in self.runs.values()])
+
     def sentences(self) -> Iterator[str]:
         """The origin for people; nothing in it depends on when the results that are not kept were made."""
         if not self.program:

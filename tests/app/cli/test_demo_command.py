@@ -2,13 +2,16 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from schema_kit import check
 
+from app.cli.demo import _print_compared
 from app.runs.reader import open_run
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
@@ -21,7 +24,10 @@ def demonstrated(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[s
     command = [sys.executable, "-m", "app", "demo", "--json", "--directory", str(folder)]
     result = subprocess.run(command, capture_output=True, text=True, check=False)
     assert result.returncode == 0, result.stderr
-    return folder, json.loads(result.stdout)
+    (folder.parent / "said.txt").write_text(result.stderr, "utf-8")
+    document = json.loads(result.stdout)
+    check("demo", document)
+    return folder, document
 
 
 def test_friction_is_within_one_per_cent_of_the_truth(demonstrated: tuple[Path, dict[str, Any]]) -> None:
@@ -56,3 +62,23 @@ def test_the_demo_leaves_run_and_figure_only(demonstrated: tuple[Path, dict[str,
         Path(document["run"]).name,
         Path(document["figure"]).name,
     }
+
+
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "tutorial" / "first-test.md"
+
+
+def shape(line: str) -> str:
+    """A line without its digits and paths, which differ from run to run, and without widths of columns."""
+    return " ".join(re.sub(r"\S*/|[-+\d.]*\d", "", line).split())
+
+
+def test_the_tutorial_shows_what_the_demo_prints(
+    demonstrated: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder, document = demonstrated
+    _, stages, table, *_ = re.findall(r"^```\n(.*?)^```", PAGE.read_text("utf-8"), re.MULTILINE | re.DOTALL)
+    said = (folder.parent / "said.txt").read_text("utf-8")
+    assert {shape(line) for line in stages.splitlines()} <= {shape(line) for line in said.splitlines()}
+    _print_compared(document["results"], document["truth"])
+    printed = capsys.readouterr().out
+    assert [shape(line) for line in table.splitlines()] == [shape(line) for line in printed.splitlines()]

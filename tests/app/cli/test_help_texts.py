@@ -24,6 +24,7 @@ UNIT = re.compile(
     r"\((m|m/s|mm|kg|s|Hz|kg/s|1/s|N/m|rad|ppm|%|degrees C|s since 1970|mm, or counts[^)]*)\)"
     r"|\b[Ss]econds\b|([Ss]amples|[Rr]ows) a second|in counts|\bMetres\b"
 )
+UNITS = {"M", "M/S", "MM", "KG", "S", "HZ", "KG/S", "1/S", "N/M", "RAD", "PPM", "PERCENT", "CELSIUS"}
 PURE = re.compile(r"f_[ds]\b|friction coefficient|[Ff]raction|share|by this fraction|[Rr]elative standard")
 """Numbers that have no unit."""
 
@@ -44,7 +45,8 @@ def options_of(text: str) -> dict[str, str]:
 def test_lists_of_commands_say_in_whole_sentences_what_they_do(
     slipstand: Any, group: tuple[str, ...]
 ) -> None:
-    listed = slipstand(*group, "--help").out.split("Commands:\n")[1].strip().splitlines()
+    commands = slipstand(*group, "--help").out.split("Commands:\n")[1].partition("\n\n")[0]
+    listed = commands.strip().splitlines()
     names = {" ".join((*group, line.split()[0])) for line in listed}
 
     assert names - {"device"} == {name for name in COMMANDS if name.split()[:-1] == list(group)}
@@ -53,22 +55,83 @@ def test_lists_of_commands_say_in_whole_sentences_what_they_do(
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_number_has_its_unit(slipstand: Any, command: str) -> None:
-    numbers = {
-        name: said
-        for name, said in options_of(slipstand(*command.split(), "--help").out).items()
-        if re.match(r"<?float", said, re.IGNORECASE)
-    }
+    said = options_of(slipstand(*command.split(), "--help").out)
+    pure = {name: text for name, text in said.items() if text.startswith("NUMBER")}
+    with_unit = {name for name, text in said.items() if text.split(" ")[0] in UNITS}
 
-    assert [name for name, said in numbers.items() if not (UNIT.search(said) or PURE.search(said))] == []
-    assert numbers or command not in ("demo", "record", "simulate", "plan", "import", "device simulate")
+    assert [name for name, text in pure.items() if not (UNIT.search(text) or PURE.search(text))] == []
+    assert with_unit or command not in ("record", "simulate", "plan", "import", "device simulate")
 
 
-@pytest.mark.parametrize("command", ["record", "simulate", "plan", "import"])
-def test_the_example_of_a_command_names_options_that_it_has(slipstand: Any, command: str) -> None:
-    text, example = slipstand(command, "--help").out.split("Example:")
+@pytest.mark.parametrize("command", COMMANDS)
+def test_values_are_called_by_what_they_are_and_not_by_a_python_type(slipstand: Any, command: str) -> None:
+    text = slipstand(*command.split(), "-h").out
+    assert re.findall(r"<[a-z%]|FLOAT|INTEGER|PATH\b|\.\.\.\.|\{", text) == []
+
+
+@pytest.mark.parametrize(
+    ("command", "shown"),
+    [
+        ("record", "--series CODE"),
+        ("record", "--plate-mass KG"),
+        ("runs", "--since DATE"),
+        ("runs", "--until DATE"),
+        ("analyze", "--until S"),
+        ("calibrate", "--valid-until DATE"),
+        ("report", "--date DATE"),
+        ("import", "--table COLUMN"),
+        ("analyze", "slipstand analyze [OPTIONS] RUN|FOLDER..."),
+        ("runs", "slipstand runs [OPTIONS] [FOLDER]"),
+    ],
+)
+def test_what_stands_for_a_value(slipstand: Any, command: str, shown: str) -> None:
+    assert shown in " ".join(slipstand(command, "--help").out.split())
+
+
+def test_short_help_is_that_of_every_command(slipstand: Any) -> None:
+    for command in ((), ("device",), ("device", "list"), ("calibrate", "check")):
+        assert slipstand(*command, "-h").out == slipstand(*command, "--help").out
+
+
+def completed(words: str) -> list[str]:
+    """What a shell gets for the last word of a command."""
+    environment = {**os.environ, "_SLIPSTAND_COMPLETE": "complete_bash", "COMP_WORDS": words}
+    environment["COMP_CWORD"] = str(len(words.split(" ")) - 1)
+    command = [sys.executable, "-m", "slipstand"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("slipstand rec", ["record", "recover"]),
+        ("slipstand device he", ["health"]),
+        ("slipstand export --format pa", ["parquet"]),
+        ("slipstand record --series 2SSM", ["2SSM0", "2SSM1", "2SSM2", "2SSM3"]),
+        ("slipstand record --protocol gs", ["gsv", "gsv-234"]),
+        ("slipstand runs --sinc", ["--since"]),
+    ],
+)
+def test_words_are_completed(words: str, expected: list[str]) -> None:
+    assert completed(words) == expected
+
+
+def test_completion_is_installed_by_an_option(slipstand: Any) -> None:
+    assert "_SLIPSTAND_COMPLETE" in slipstand("--show-completion", "bash").out
+    assert "--install-completion" in slipstand("--help").out
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_the_example_of_a_command_names_options_that_it_has(
+    slipstand: Any, command: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TERMINAL_WIDTH", "300")
+    monkeypatch.setenv("COLUMNS", "300")
+    text, example = slipstand(*command.split(), "--help").out.split("Example:")
     known = {*options_of(text), "-o"}
 
-    assert example.split()[:2] == ["slipstand", command]
+    assert " ".join(example.split()).startswith(f"slipstand {command}")
     assert set(re.findall(r"(?<=\s)--?[a-z][a-z-]*", example)) <= known
 
 

@@ -38,6 +38,43 @@ def test_a_condition_of_ones_own_stands_beside_the_others(slipstand: Any, run: P
     assert listed["conditions"]["plate_id"] == "P2"
 
 
+def test_paths_are_relative_to_the_present_folder_and_a_fault_has_a_column(
+    slipstand: Any, run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (run.parent / "broken.h5").write_text("no run")
+    assert str(run) in slipstand("runs", run.parent).out
+    monkeypatch.chdir(run.parent.parent)
+    header, good, bad = slipstand("runs", run.parent).out.splitlines()
+    assert header.split() == ["run", "series", "begun", "seconds", "ended", "source", "f_d", "fault"]
+    assert good.split()[:2] == [str(Path("library", "run.h5")), "1FFM0"]
+    assert bad.split()[0] == str(Path("library", "broken.h5"))
+    assert header.index("fault") == len(bad[: bad.index("is not an HDF5 file")].rpartition("  ")[0]) + 2
+    assert "fault" not in slipstand("runs", run.parent, "--series", "1FFM0").out
+    (listed, _) = slipstand("runs", run.parent, "--json").json
+    assert listed["path"] == str(run)
+
+
+def test_columns_and_order_are_chosen(slipstand: Any, run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(run.parent)
+    for name, friction in (("a", 0.12), ("b", 0.08)):
+        slipstand("simulate", "--series", "1FFM0", "--friction", friction, "--rate", 500, "-o", f"{name}.h5")
+        slipstand("analyze", f"{name}.h5", "--save")
+    slipstand("simulate", "--series", "1FFM0", "--rate", 500, "-o", "c.h5")
+
+    def names(*options: object) -> list[str]:
+        header, *rows = slipstand("runs", ".", "--columns", "run,T,source", *options).out.splitlines()
+        assert header.split() == ["run", "T", "source"]
+        assert "ms  simulated" in rows[0]
+        return [row.split()[0] for row in rows]
+
+    assert names("--sort", "f_d") == ["b.h5", "run.h5", "a.h5", "c.h5"]
+    assert names("--sort", "f_d", "--reverse") == ["a.h5", "run.h5", "b.h5", "c.h5"]
+    ordered = slipstand("runs", ".", "--sort", "f_d", "--json").json
+    assert [Path(one["path"]).name for one in ordered] == ["b.h5", "run.h5", "a.h5", "c.h5"]
+    assert_one_error_line(slipstand("runs", ".", "--columns", "run,x"), "--columns 'x' is not known")
+    assert_one_error_line(slipstand("runs", ".", "--sort", "x"), "--sort 'x' is not known")
+
+
 def test_runs_that_a_filter_leaves_out_are_not_said_to_be_missing(slipstand: Any, run: Path) -> None:
     said = slipstand("runs", run.parent, "--stale").out
     assert "is of that kind" in said

@@ -16,7 +16,8 @@ def test_report_is_written_and_told(slipstand, run, tmp_path):
 
     assert said.code == 0
     told = {"report": str(target), "date": "2026-11-21", "runs": [str(run)], "failures": []}
-    assert said.json == told | {"origin": said.json["origin"]}
+    assert said.json == told | {"origin": said.json["origin"], "number": said.json["number"]}
+    assert said.json["number"].startswith("20261121-")
     assert said.json["origin"]["reproduce"].startswith("slipstand report")
     first = target.read_bytes()
     assert first.startswith(b"%PDF")

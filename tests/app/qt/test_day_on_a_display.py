@@ -76,15 +76,18 @@ def amplifier(home: Path) -> Iterator[Amplifier]:
 
 
 def test_a_day_in_the_program(home: Path, amplifier: Amplifier) -> None:
-    with window_system(home) as environment, program(environment, home) as desk:
-        first = first_result(desk, home)
-        decide(desk, first)
-        look_closely(desk)
-        pull_by_hand(desk, amplifier, home)
-        lose(desk, amplifier)
-        review(desk, first, home)
-        desk.press("ctrl+q")
-        assert desk.process.wait(30.0) == 0
+    with window_system(home) as environment:
+        with program(environment, home) as desk:
+            first = first_result(desk, home)
+            decide(desk, first)
+            look_closely(desk)
+            pull_by_hand(desk, amplifier, home)
+            lose(desk, amplifier)
+            review(desk, first, home)
+            bring_a_file(desk, home)
+            close_while_recording(desk, home)
+        with program(environment, home) as desk:
+            begin_again(desk, first)
 
 
 def runs_of(home: Path) -> list[Path]:
@@ -272,3 +275,57 @@ def changed(desk: Desk, before: dict) -> dict | None:
 
 def width(plot: dict) -> float:
     return plot["x"][1] - plot["x"][0]
+
+
+def bring_a_file(desk: Desk, home: Path) -> None:
+    """Import a text in UTF-16 with a decimal comma, units below the names, and empty last columns."""
+    source = open_run(runs_of(home)[0], trusted=True)
+    assert source.relative_reading is not None
+    columns = (source.time_s, source.table_reading, source.relative_reading)
+    lines = ["Zeit;Tisch;Platte;;", "s;mm;mm;;"]
+    lines += [
+        f"{t:.4f};{u * 1e3:.5f};{v * 1e3:.5f};;".replace(".", ",")
+        for t, u, v in zip(*(column[::4] for column in columns), strict=True)
+    ]
+    text = home / "odd.csv"
+    text.write_text("\n".join(lines), encoding="utf-16")
+    screen(desk, 4)
+    desk.press("ctrl+i")
+    desk.wait_for_field("QFileDialog")
+    desk.write(str(text))
+    desk.press("Return")
+    desk.wait_for("Zeit;Tisch;Platte")
+    before = len(runs_of(home))
+    desk.wait(lambda: desk.button("Import")["text"] == "Import", "a file that can be imported")
+    desk.click("Import")
+    desk.wait(lambda: len(runs_of(home)) > before, "the imported run")
+    desk.press("Escape")
+
+
+def close_while_recording(desk: Desk, home: Path) -> None:
+    """Closing the window by the window manager asks, and what is recorded becomes a run."""
+    before = len(runs_of(home))
+    screen(desk, 1)
+    desk.click("Try with the simulated stand")
+    desk.click("Start the simulated stand")
+    desk.wait(lambda: desk.button("Arm")["primary"], "a stand that is ready")
+    desk.click("Arm")
+    desk.wait_for("The plate slides")
+    desk.press("alt+F4")
+    desk.wait_for("Closing the window")
+    desk.press("Return")
+    desk.wait_until_gone("Closing the window")
+    desk.press("alt+F4")
+    desk.click("Close the window")
+    assert desk.process.wait(30.0) == 0
+    assert len(runs_of(home)) == before + 1
+
+
+def begin_again(desk: Desk, first: Path) -> None:
+    """The next start offers the last device and recent runs, and a run is opened by a click."""
+    screen(desk, 1)
+    assert desk.button("Connect again")["primary"]
+    desk.click(f"Open {first.stem}")
+    desk.wait(lambda: desk.title().startswith(f"{first.stem} "), "the run in the title")
+    desk.press("ctrl+q")
+    assert desk.process.wait(30.0) == 0

@@ -22,6 +22,18 @@ show = MainWindow.show
 MainWindow.show = lambda window: (show(window), os.kill(os.getpid(), signal.SIGINT))
 sys.exit(run_window())
 """
+RUN_NAMED = """
+import os, signal, sys
+from app.__main__ import main
+from app.presenters.window import WindowPresenter
+open_run = WindowPresenter.open_run
+def interrupted(window, path):
+    open_run(window, path)
+    os.kill(os.getpid(), signal.SIGINT)
+WindowPresenter.open_run = interrupted
+sys.argv = ["slipstand", {path!r}]
+main()
+"""
 NOWHERE = {"QT_QPA_PLATFORM": None, "DISPLAY": None, "WAYLAND_DISPLAY": None}
 REFUSED = """
 import sys
@@ -29,19 +41,6 @@ from PySide6.QtWidgets import QMessageBox
 QMessageBox.critical = lambda *words: sys.stdout.write(words[-1])
 from app.qt.main import run_window
 sys.exit(run_window())
-"""
-
-OPENED = """
-import sys
-from PySide6.QtGui import QGuiApplication
-from app.presenters.window import WindowPresenter
-def opened(presenter, path):
-    sys.stdout.write(f"{path} {QGuiApplication.windowIcon().isNull()}")
-    presenter.close_window()
-WindowPresenter.open_run = opened
-from app.__main__ import main
-sys.argv = ["slipstand", PATH]
-main()
 """
 
 
@@ -85,16 +84,37 @@ def test_a_settings_file_that_cannot_be_used_is_said(tmp_path: Path) -> None:
     assert "stand.toml" in result.stdout
 
 
-def test_a_run_that_is_opened_in_a_file_manager_is_opened_in_the_window(tmp_path: Path) -> None:
-    run_file = tmp_path / "Run 1.H5"
-    run_file.touch()
-    result = run(OPENED.replace("PATH", repr(str(run_file))), SLIPSTAND_CONFIG=str(tmp_path))
-    assert (result.returncode, result.stdout) == (0, f"{run_file} False"), result.stderr
+@pytest.mark.skipif(sys.platform == "win32", reason="a process cannot send itself Ctrl-C there")
+def test_a_run_that_is_named_is_opened(tmp_path: Path, short_runs: list[Path]) -> None:
+    result = run(RUN_NAMED.format(path=str(short_runs[0])), SLIPSTAND_CONFIG=str(tmp_path))
+    assert result.returncode == 130, result.stderr
+    assert "Traceback" not in result.stderr
+    (recent,) = tomllib.loads((tmp_path / "recent.toml").read_text(encoding="utf-8"))["runs"]
+    assert Path(recent) == short_runs[0]
 
 
-def test_a_run_that_is_not_there_is_no_command(tmp_path: Path) -> None:
-    result = run(OPENED.replace("PATH", repr(str(tmp_path / "none.h5"))), SLIPSTAND_CONFIG=str(tmp_path))
-    assert (result.returncode, result.stdout) == (2, "")
+def test_a_run_that_is_not_there_is_one_line(tmp_path: Path) -> None:
+    result = run(RUN_NAMED.format(path="absent.h5"), SLIPSTAND_CONFIG=str(tmp_path))
+    assert result.returncode == 1
+    assert result.stderr.startswith("error: absent.h5: there is no such file.")
+    assert result.stderr.count("\n") == 1
+
+
+def test_the_window_has_an_icon() -> None:
+    code = """
+import sys
+from PySide6.QtGui import QGuiApplication
+from app.presenters.window import WindowPresenter
+def opened(presenter, series):
+    sys.stdout.write(str(QGuiApplication.windowIcon().isNull()))
+    presenter.close_window()
+WindowPresenter.open_simulated = opened
+from app.__main__ import main
+sys.argv = ["slipstand", "--simulated"]
+main()
+"""
+    result = run(code)
+    assert (result.returncode, result.stdout) == (0, "False"), result.stderr
 
 
 def test_a_system_without_the_libraries_of_qt_is_told_in_one_line() -> None:

@@ -5,9 +5,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from reports_kit import truth_of
 
+from analysis.identify import identify
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.one_mass.identify import identify_one_mass, single_channel
+from analysis.record import Record
+from analysis.synthetic import simulate_readings
 from app.cli.analysis_text import print_analysis
 from app.reports.figures.record_figure import figure_title, record_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
@@ -78,3 +82,39 @@ def test_the_misfit_is_a_share_of_the_swing(swing, found, capsys):
 
     print_analysis(document, "rad")
     assert f"; {100.0 * share:.2g} % of the swing is left" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def pushed_back():
+    """A pullback test whose plate was pushed back 4.5 s after the release, with readings that are absent."""
+    truth = truth_of(duration_s=6.0)
+    time_s, table, relative = simulate_readings(truth)
+    moved = time_s > truth.hold_s + 4.5
+    relative = relative + np.where(moved, 4e-3 * np.minimum(1.0, (time_s - truth.hold_s - 4.5) / 0.2), 0.0)
+    table = table.copy()
+    table[300:310] = np.nan
+    record = Record.from_arrays(
+        time_s, table, relative, table_mass_kg=truth.table_mass_kg, plate_mass_kg=truth.plate_mass_kg
+    )
+    return record, identify(record)
+
+
+def test_residuals_of_each_gauge_have_a_panel_over_all_that_was_fitted(pushed_back):
+    record, found = pushed_back
+    end_s = found.events.free_decay_end_s
+    assert end_s is not None
+    with print_style():
+        table, of_table, relative, of_relative = record_figure(record, found).axes
+
+    for axes in (of_table, of_relative):
+        assert axes.get_ylabel() == "residual (µm)"
+        assert len([line for line in axes.lines if line.get_label() == "record − simulation"]) == 1
+    for axes in (table, relative):
+        shown_s = axes.lines[0].get_xdata()
+        assert shown_s[0] == pytest.approx(max(-1.0, record.time_s[0] - found.events.release_s), abs=0.02)
+        assert shown_s[-1] > end_s - found.events.release_s
+        hatched = [patch for patch in axes.patches if patch.get_hatch()]
+        assert [patch.get_x() for patch in hatched] == [pytest.approx(end_s - found.events.release_s)]
+    marks = [line for line in table.lines if line.get_label() == "absent or overloaded"]
+    assert [len(line.get_xdata()) for line in marks] == [10]
+    assert not [line for line in relative.lines if line.get_label() == "absent or overloaded"]

@@ -23,19 +23,22 @@ from app.reports.test_report.blocks import (
     Symbol,
     Text,
 )
-from app.reports.test_report.build import ReportHead, build_report
+from app.reports.test_report.build import build_report
+from app.reports.test_report.head import ReportHead
 from app.reports.test_report.render import printable, render_pdf, typeset_report, write_report
 from app.runs.analyze import repeat_saved_analysis
 from app.runs.campaign.collect import CollectOptions, collect_runs
 from app.runs.errors import RunExistsError
 from app.version import __version__, commit
 
-HEAD = ReportHead(datetime.date(2026, 11, 21), laboratory="Laboratory of Mechanics")
+HEAD = ReportHead(date=datetime.date(2026, 11, 21), laboratory="Laboratory of Mechanics")
 NOTE = '#panic("no") *bold* _it_ $x$ <label> @ref \\ // `raw` [a](b) 1. = Head'
 
 
 def small(*blocks):
-    return Report("Title", "Subtitle", "", "2026-11-21", "Slipstand", [Section("Part", list(blocks))])
+    return Report(
+        "Title", "Subtitle", [], None, "R-1", "2026-11-21", "Slipstand", [Section("Part", list(blocks))]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -223,7 +226,7 @@ def test_what_an_operator_wrote_is_no_command(text):
     report = small(Facts([("note", text)]), Points([text]), Text(text), Grid(["a"], [[text]], note=text))
 
     assert render_pages(report, 20.0)
-    written = msgspec.structs.replace(report, title=text, subtitle=text, laboratory=text)
+    written = msgspec.structs.replace(report, title=text, subtitle=text, head=[("laboratory", text)])
     assert render_pages(written, 20.0)
     assert render_pages(plain, 20.0) != render_pages(small(Text(text)), 20.0)
 

@@ -101,7 +101,7 @@ def test_ratio_of_frictions_has_its_interval_and_scatter():
     ]
     (sentence,) = map(ratio_sentence, summarize(runs).ratios)
 
-    assert sentence == "FF: 2.0000(58) (95 %: 1.98 to 2.02) over 3 series with a standard deviation of 0.01"
+    assert sentence == "FF: 2.0000(58) (95 %: 1.975 to 2.025) over 3 series with a standard deviation of 0.01"
 
 
 def test_what_is_said_of_many_series_is_said_once():
