@@ -17,7 +17,10 @@ FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 # A window system, its window manager, and hands of an operator, for tests of the window.
 DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 
-.PHONY: docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
+# What logs the system calls that the drill of a power cut rebuilds disks from.
+TEST_PACKAGES := strace
+
+.PHONY: test-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -31,6 +34,7 @@ help:
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make windows  demo, ports, window and tests on Windows' Python under Wine, as root (docs/systems.md); the first time half an hour"
+	@echo "make test-tools   what some tests need of the system, and are skipped without"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make desktop-tools   window system and manager for the test of a day in the window, which is skipped without them"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
@@ -50,6 +54,9 @@ $(READY): requirements.lock pyproject.toml setup.py | system-libraries
 system-libraries:
 	@$(call install_packages,$(QT_PACKAGES),test -x $(BIN)/python || $(PYTHON) -c 'import ensurepip' 2>/dev/null || \
 		missing="$$missing $$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')")
+
+test-tools:
+	@$(call install_packages,$(TEST_PACKAGES),true)
 
 firmware-tools:
 	@$(call install_packages,$(FIRMWARE_PACKAGES),true)
@@ -119,12 +126,13 @@ bench-desktop: setup
 	@for script in desktop desktop_handle; do \
 		echo "== benchmarks/$$script.py"; $(BIN)/python benchmarks/$$script.py || exit 1; done
 
-drill: setup
+drill: setup test-tools
 	$(BIN)/python -m tests.drills.kill_engine --count 200
 	$(BIN)/python -m tests.drills.kill_window --count 50
 	$(BIN)/python -m tests.drills.unplug --count 100
 	$(BIN)/python -m tests.drills.disk_full --count 50
 	$(BIN)/python -m tests.drills.starved --count 14
+	$(BIN)/python -m tests.drills.power_loss --count 2000
 	$(BIN)/python -m tests.drills.damaged_runs --count 10000
 	$(BIN)/python -m tests.drills.hostile_texts --count 20000
 	$(BIN)/python -m tests.drills.oversized_files

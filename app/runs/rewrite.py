@@ -9,11 +9,11 @@ import h5py
 
 from app.runs import schema
 from app.runs.columns import check_column, checksum, is_finished, sample_paths
-from app.runs.disk import check_free_space, storage_error, sync_file, sync_folder, temporary_copy
+from app.runs.disk import check_free_space, storage_error, sync_file, temporary_copy
 from app.runs.errors import UnsuitableRunError, WriteError, being_recorded, no_such_run
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
 from app.runs.validation import validate_file
-from config.durable_files import remove_file, replace_file
+from config.durable_files import remove_file, replace_file, sync_folder
 
 _ROOM_BYTES = 1 << 22  # beyond the size of the file: a long analysis with its tables needs less than 1 MB
 

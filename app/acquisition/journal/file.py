@@ -4,14 +4,14 @@ import contextlib
 import logging
 import os
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
-from app.runs.disk import has_free_space, sync_folder
+from app.runs.disk import has_free_space, unfinished_name
 from app.runs.journal import MAGIC
 from app.runs.lock import FileLock, LockHeldError, recording_lock
-from config.durable_files import sync_descriptor
+from config.durable_files import give_new_name, make_folders, sync_descriptor, sync_folder
 
 _log = logging.getLogger(__name__)
 
@@ -58,6 +58,7 @@ class JournalFile:
         self._lock = lock
         self._fallback_folders = list(fallback_folders)
         self._sync: FileSync | None = None
+        self._is_copied = False
 
     def append(self, record: bytes) -> None:
         """Write a record. Raises OSError where no folder takes it."""
@@ -118,32 +119,27 @@ class JournalFile:
         raise error
 
     def _move_to(self, path: Path) -> None:
-        with _new_file(path) as (file, lock):
-            is_copied = self._copy_to(file)
+        file, lock = _make_file(path, self._copy_to)
         with contextlib.suppress(OSError):
             self._file.close()
-        if is_copied:  # its run file may need the space
+        if self._is_copied:  # its run file may need the space
             self.remove()
         self.release()
         self._sync = None  # one of the old file that fails now does not concern the new one
         self.path, self._file, self._lock = path, file, lock
 
-    def _copy_to(self, file: IO[bytes]) -> bool:
-        """Copy all records to another file; False where only the first one could be had."""
-        is_readable = True
+    def _copy_to(self, file: IO[bytes]) -> None:
+        """Copy all records to another file, or the first one where no more can be had."""
+        self._is_copied = True
         try:
             for piece in self._pieces():
                 _write_all(file, piece)
         except _UnreadableError:
-            is_readable = False
+            self._is_copied = False
             file.seek(0)
             file.truncate()
             _write_all(file, self._first)
             self.size = len(self._first)
-        sync_descriptor(file.fileno())
-        with contextlib.suppress(OSError):
-            sync_folder(self.path.parent)
-        return is_readable
 
     def _pieces(self) -> Iterator[bytes]:
         left = self.size
@@ -168,24 +164,27 @@ def create_journal_file(
 ) -> JournalFile:
     """Create a journal with its first record. Raises OSError, FileExistsError, LockHeldError."""
     first = MAGIC + first_record
-    with _new_file(path) as (file, lock):
-        _write_all(file, first)
-        sync_folder(path.parent)
+    file, lock = _make_file(path, lambda made: _write_all(made, first))
     return JournalFile(path, file, first, lock, fallback_folders)
 
 
-@contextlib.contextmanager
-def _new_file(path: Path) -> Iterator[tuple[IO[bytes], FileLock]]:
-    """Create a file, its lock and its folder; the file and the lock go if the body fails."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+def _make_file(path: Path, write: Callable[[IO[bytes]], None]) -> tuple[IO[bytes], FileLock]:
+    """Create a file with its folder and lock; it has its name once all that `write` writes is on disk."""
+    make_folders(path.parent)
     lock = recording_lock(path).acquire()
+    temporary = unfinished_name(path)
     with contextlib.ExitStack() as undo:
         undo.callback(lock.release)
-        file = path.open("xb", buffering=0)
+        undo.callback(temporary.unlink, missing_ok=True)
+        with temporary.open("xb", buffering=0) as made:
+            write(made)
+            sync_descriptor(made.fileno())
+        give_new_name(temporary, path)
         undo.callback(path.unlink)
-        undo.callback(file.close)
-        yield file, lock
+        sync_folder(path.parent)
+        file = path.open("ab", buffering=0)
         undo.pop_all()
+    return file, lock
 
 
 def _write_all(file: IO[bytes], data: bytes) -> None:
