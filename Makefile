@@ -17,8 +17,8 @@ FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 # A window system, its window manager, and hands of an operator, for tests of the window.
 DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 
-# What logs the system calls that the drill of a power cut rebuilds disks from.
-TEST_PACKAGES := strace
+# What logs the system calls that the drill of a power cut rebuilds disks from, and mounts a disk that hangs.
+TEST_PACKAGES := strace bindfs
 
 .PHONY: test-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
@@ -132,6 +132,7 @@ drill: setup test-tools
 	$(BIN)/python -m tests.drills.unplug --count 100
 	$(BIN)/python -m tests.drills.disk_full --count 50
 	$(BIN)/python -m tests.drills.starved --count 14
+	$(BIN)/python -m tests.drills.hanging_disk --count 10
 	$(BIN)/python -m tests.drills.power_loss --count 2000
 	$(BIN)/python -m tests.drills.damaged_runs --count 10000
 	$(BIN)/python -m tests.drills.hostile_texts --count 20000

@@ -112,6 +112,7 @@ class ExistingRun:
     end: EndMetadata | None
     has_additions: bool
     """Analyses or edits were added after it was recorded."""
+    raw_bytes_stored: bool
 
 
 def inspect_run(path: Path) -> ExistingRun | None:
@@ -121,7 +122,10 @@ def inspect_run(path: Path) -> ExistingRun | None:
         additions = bool(len(file[schema.HISTORY])) or any(
             name.startswith(schema.ANALYSIS_PREFIX) for name in file[schema.ENTRY]
         )
-        return ExistingRun(read_identifier(file), stored_rows(file), read_end_metadata(file), additions)
+        has_bytes = bool(len(file[schema.WIRE_DATA.path]))
+        return ExistingRun(
+            read_identifier(file), stored_rows(file), read_end_metadata(file), additions, has_bytes
+        )
 
     try:
         check_openable(path)

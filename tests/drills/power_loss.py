@@ -144,7 +144,7 @@ class Log:
             given = [str(root), str(place / "told"), stand.port, options.protocol]
             command = [sys.executable, "-m", "tests.drills.power_loss", "--work", *given]
             environment = {"SLIPSTAND_CONFIG": root / "config", "XDG_CACHE_HOME": root / "cache"}
-            with _environment({name: str(path) for name, path in environment.items()}):
+            with environment({name: str(path) for name, path in environment.items()}):
                 self.disk = Disk(root, log_calls(command, logs))
         self.disk.check()
         (path,) = (root / "runs").glob("*.h5")
@@ -188,7 +188,7 @@ class Log:
 
 
 @contextmanager
-def _environment(values: dict[str, str]) -> Iterator[None]:
+def environment(values: dict[str, str]) -> Iterator[None]:
     before = dict(os.environ)
     os.environ.update(values)
     try:
@@ -218,7 +218,7 @@ def power_loss(count: int, folder: Path, seed: int = 0) -> PowerReport:
 def _check(root: Path, at_s: float, log: Log, report: PowerReport) -> None:
     told = log.disk.told_by(at_s)
     _check_runs(root / "runs", told, log, log.synced_samples(at_s), report)
-    with _environment({"SLIPSTAND_CONFIG": str(root / "config"), "XDG_CACHE_HOME": str(root / "cache")}):
+    with environment({"SLIPSTAND_CONFIG": str(root / "config"), "XDG_CACHE_HOME": str(root / "cache")}):
         _check_settings(root / "config", told)
         if "listed" in told:
             msgspec.msgpack.decode(index_path(Path(log.disk.root) / "runs").read_bytes())

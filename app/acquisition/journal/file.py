@@ -1,9 +1,11 @@
 """The file of a journal, which moves to another folder when its own takes no more."""
 
 import contextlib
+import errno
 import logging
 import os
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
@@ -26,6 +28,7 @@ class FileSync(threading.Thread):
     def __init__(self, descriptor: int) -> None:
         super().__init__(name="journal sync", daemon=True)
         self.failure: OSError | None = None  # known when the thread has ended
+        self.began_s = time.perf_counter()
         self._descriptor = os.dup(descriptor)
         self.start()
 
@@ -59,9 +62,24 @@ class JournalFile:
         self._fallback_folders = list(fallback_folders)
         self._sync: FileSync | None = None
         self._is_copied = False
+        self._is_made = True
+
+    def successor(self) -> "JournalFile":
+        """A journal of the same run that begins in a fallback folder; the first `append` makes its file."""
+        made = JournalFile(self.path, self._file, self._first, self._lock, self._fallback_folders)
+        made._is_made = False
+        return made
+
+    @property
+    def sync_began_s(self) -> float | None:
+        """When the sync began that is under way, by `time.perf_counter`; None for none."""
+        sync = self._sync
+        return sync.began_s if sync is not None and sync.is_alive() else None
 
     def append(self, record: bytes) -> None:
         """Write a record. Raises OSError where no folder takes it."""
+        while not self._is_made:
+            self._begin()
         while True:
             try:
                 _write_all(self._file, record)
@@ -95,7 +113,8 @@ class JournalFile:
     def close(self) -> None:
         if self._sync is not None:
             self._sync.join()
-        self._file.close()
+        if self._is_made:
+            self._file.close()
 
     def remove(self) -> None:
         with contextlib.suppress(OSError):
@@ -105,6 +124,17 @@ class JournalFile:
         """Release the lock: if the file is still there, a recovery may take it."""
         with contextlib.suppress(OSError):
             self._lock.release()
+
+    def _begin(self) -> None:
+        """Make the file in the next fallback folder that takes it. Raises OSError where none does."""
+        while self._fallback_folders:
+            path = self._fallback_folders.pop(0) / self.path.name
+            with contextlib.suppress(OSError, LockHeldError):
+                file, lock = _make_file(path, lambda made: _write_all(made, self._first))
+                self.path, self._file, self._lock, self._is_made = path, file, lock, True
+                self.size = len(self._first)
+                return
+        raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
 
     def _move(self, error: OSError) -> None:
         while self._fallback_folders:
