@@ -20,7 +20,9 @@ DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 # What logs the system calls that the drill of a power cut rebuilds disks from, and mounts a disk that hangs.
 TEST_PACKAGES := strace bindfs
 
-.PHONY: test-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
+
+
+.PHONY: audit licences wheel test-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -38,6 +40,8 @@ help:
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make desktop-tools   window system and manager for the test of a day in the window, which is skipped without them"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
+	@echo "make audit   known vulnerabilities of the locked packages, by the advisories of PyPI"
+	@echo "make licences, make wheel   docs/licences.md; the wheel with its bill of materials (CycloneDX) into dist"
 	@echo "make docs    the documentation site into docs/_build/html, which needs no network"
 	@echo "make translations   new texts into the catalogues of messages/locale"
 
@@ -145,6 +149,24 @@ peers: setup
 windows: setup
 	@$(call install_packages,debootstrap,true)
 	$(BIN)/python -m tools.windows
+
+# Beside the virtual environment, so that its packages stay those of the lock.
+$(VENV)/tools/.ready:
+	$(PYTHON) -m venv $(VENV)/tools
+	$(VENV)/tools/bin/python -m pip install --quiet --disable-pip-version-check pip-audit pip-licenses cyclonedx-bom build
+	@touch $@
+
+audit: $(VENV)/tools/.ready
+	$(VENV)/tools/bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
+
+licences: setup $(VENV)/tools/.ready
+	@{ printf '# Licences\n\nOf the packages of `requirements.lock`, those for development included, as they state them. Made by `make licences`.\n\n'; \
+		$(VENV)/tools/bin/pip-licenses --python $(BIN)/python --ignore-packages slipstand --format=markdown --with-urls | sed 's/  */ /g; /^|-/s/--*/---/g'; } >docs/licences.md
+
+# The wheel into dist/, and beside it what it is made of, in the form of CycloneDX.
+wheel: setup $(VENV)/tools/.ready
+	$(VENV)/tools/bin/python -m build --wheel --outdir dist
+	$(VENV)/tools/bin/cyclonedx-py requirements --pyproject pyproject.toml --output-reproducible --of JSON -o dist/slipstand.cdx.json requirements.lock
 
 docs: setup
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html

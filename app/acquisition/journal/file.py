@@ -13,6 +13,7 @@ from typing import IO
 from app.runs.disk import has_free_space, unfinished_name
 from app.runs.journal import MAGIC
 from app.runs.lock import FileLock, LockHeldError, recording_lock
+from app.runs.paths import make_private_folder
 from config.durable_files import give_new_name, make_folders, sync_descriptor, sync_folder
 
 _log = logging.getLogger(__name__)
@@ -128,8 +129,10 @@ class JournalFile:
     def _begin(self) -> None:
         """Make the file in the next fallback folder that takes it. Raises OSError where none does."""
         while self._fallback_folders:
-            path = self._fallback_folders.pop(0) / self.path.name
+            folder = self._fallback_folders.pop(0)
+            path = folder / self.path.name
             with contextlib.suppress(OSError, LockHeldError):
+                make_private_folder(folder)
                 file, lock = _make_file(path, lambda made: _write_all(made, self._first))
                 self.path, self._file, self._lock, self._is_made = path, file, lock, True
                 self.size = len(self._first)
@@ -141,6 +144,7 @@ class JournalFile:
             folder = self._fallback_folders.pop(0)
             if has_free_space(folder, self.size + _ROOM_BYTES):
                 with contextlib.suppress(OSError, LockHeldError):
+                    make_private_folder(folder)
                     self._move_to(folder / self.path.name)
                     self.move_cause = self.move_cause or error
                     _log.warning("journal moved to %s: %s", self.path, error)
