@@ -141,6 +141,7 @@ drill: setup test-tools
 	$(BIN)/python -m tests.drills.damaged_runs --count 10000
 	$(BIN)/python -m tests.drills.hostile_texts --count 20000
 	$(BIN)/python -m tests.drills.oversized_files
+	$(BIN)/python -m tests.drills.hostile_wire
 	$(BIN)/python -m tests.drills.hostile_bytes --megabytes 1000 --frames 1000000
 
 peers: setup
