@@ -22,7 +22,7 @@ TEST_PACKAGES := strace bindfs
 
 
 
-.PHONY: audit licences wheel test-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
+.PHONY: audit licences wheel drill-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -36,7 +36,7 @@ help:
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make windows  demo, ports, window and tests on Windows' Python under Wine, as root (docs/systems.md); the first time half an hour"
-	@echo "make test-tools   what some tests need of the system, and are skipped without"
+	@echo "make drill-tools   what logs system calls and mounts a disk that hangs, for drills; their tests are skipped without"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make desktop-tools   window system and manager for the test of a day in the window, which is skipped without them"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
@@ -59,7 +59,7 @@ system-libraries:
 	@$(call install_packages,$(QT_PACKAGES),test -x $(BIN)/python || $(PYTHON) -c 'import ensurepip' 2>/dev/null || \
 		missing="$$missing $$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')")
 
-test-tools:
+drill-tools:
 	@$(call install_packages,$(TEST_PACKAGES),true)
 
 firmware-tools:
@@ -130,7 +130,7 @@ bench-desktop: setup
 	@for script in desktop desktop_handle; do \
 		echo "== benchmarks/$$script.py"; $(BIN)/python benchmarks/$$script.py || exit 1; done
 
-drill: setup test-tools
+drill: setup drill-tools
 	$(BIN)/python -m tests.drills.kill_engine --count 200
 	$(BIN)/python -m tests.drills.kill_window --count 50
 	$(BIN)/python -m tests.drills.unplug --count 100

@@ -143,8 +143,8 @@ class Log:
         with SimulatedStand.start(options) as stand:
             given = [str(root), str(place / "told"), stand.port, options.protocol]
             command = [sys.executable, "-m", "tests.drills.power_loss", "--work", *given]
-            environment = {"SLIPSTAND_CONFIG": root / "config", "XDG_CACHE_HOME": root / "cache"}
-            with environment({name: str(path) for name, path in environment.items()}):
+            folders = {"SLIPSTAND_CONFIG": root / "config", "XDG_CACHE_HOME": root / "cache"}
+            with environment({name: str(path) for name, path in folders.items()}):
                 self.disk = Disk(root, log_calls(command, logs))
         self.disk.check()
         (path,) = (root / "runs").glob("*.h5")

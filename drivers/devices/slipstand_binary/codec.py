@@ -283,7 +283,8 @@ def _is_late(state: Record, frame: Record) -> bool:
     """Tell whether a frame came before, or after ones that were sent later: its rows are counted by then."""
     behind_s = ((state.last_seq - frame.seq) & _U32) * state.period_s
     behind_by_time_s = ((state.last_t_us - frame.t_us) & _U32) * 1e-6
-    return behind_s <= _LATE_S and abs(behind_by_time_s - behind_s) <= _LATE_TOLERANCE_S
+    is_late: bool = behind_s <= _LATE_S and abs(behind_by_time_s - behind_s) <= _LATE_TOLERANCE_S
+    return is_late
 
 
 @inlined
