@@ -40,6 +40,7 @@ _log = logging.getLogger(__name__)
 Progress = Callable[[float], None]
 
 _ROOM_RATIO = 8  # bytes of a run file for each of its journal, at most: a device may send few bytes for a row
+_TEMPLATE_BYTES = 1 << 20  # of a run file, before its first row
 _WRITER_S = 20.0
 """The writer of a dead engine closes its file by itself, which takes as long as that is large."""
 
@@ -185,7 +186,18 @@ def _earlier_file(summary: JournalSummary, folder: Path) -> Path | None:
         beside = folder / Path(summary.named.path).name  # no other path of a file is followed
         if beside.suffix == SUFFIX and beside.is_file() and _identifier(beside) in (identifier, ""):
             return beside
-    return find_run_by_uuid(folder, identifier)
+    return find_run_by_uuid(folder, identifier) or _torn_file(summary, folder)
+
+
+def _torn_file(summary: JournalSummary, folder: Path) -> Path | None:
+    """A file of the run's name that a power cut tore: nothing reads it, but its UUID stands in it."""
+    identifier = summary.header.identifier.encode()
+    for path in sorted(folder.glob(f"{_stem(summary)}_*{SUFFIX}")):
+        with path.open("rb") as file:
+            is_of_run = identifier in file.read(_TEMPLATE_BYTES)
+        if is_of_run and inspect_run(path) is None:
+            return path
+    return None
 
 
 def _identifier(path: Path) -> str:
