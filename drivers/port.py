@@ -424,14 +424,14 @@ def port_busy_error(url: str, users: list[PortUser]) -> PortUnavailableError:
 
 
 _UNREACHABLE = {
+    "name or service|getaddrinfo|nodename": N_(
+        "{port} is not known in this network: check how the address is written"
+    ),
     "not known": N_(
         "{port} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port"
     ),
     "refused": N_(
         "{port} refuses: nothing listens there, start the device's server or check the port number"
-    ),
-    "name or service|getaddrinfo|nodename": N_(
-        "{port} is not known in this network: check how the address is written"
     ),
     "": N_("{port} does not answer: check address, port number, network and power of the device"),
 }  # by what pyserial and the systems write

@@ -39,6 +39,7 @@ REALTIME_FILES = {
     "test_live_stream.py",
     "test_unplug_drill.py",
     "test_disk_full_drill.py",
+    "test_power_loss_drill.py",
     "test_two_engines.py",
     "test_live_recording.py",
     "test_stand_process.py",

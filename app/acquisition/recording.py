@@ -1,6 +1,7 @@
 """One run from arming to its end. The trigger decides when it begins and ends; here it is carried out."""
 
 import contextlib
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
@@ -25,9 +26,13 @@ from app.runs.metadata import EndMetadata, RunMetadata
 from app.runs.writer_client import OpenRun, WriterClient
 from drivers.clock import TimeBase
 from drivers.samples import Losses
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message, message_of
 
 _NOTES_MAX = 100  # of a run: a cable that is loose for hours gives a new note each time
+_STALL_TOLD_S = 1.0  # the operator is told of a disk that takes nothing for so long
+_HANGS_S = 4.0  # and the run ends after so long
+_DISCARD_S = 0.5  # longest that the removal of a journal without a run is waited for
 _FOLLOW_S = 0.07
 """How often a run is followed that may wait: what is done for so many samples at once costs less."""
 
@@ -88,6 +93,7 @@ class Recording:
         )
         self._note = EMPTY
         self._is_at_rest = True  # as reported last
+        self._is_stall_told = False
         self._open_tap()
         self._update_checkpoint()
         self._send_state(self._state, self._armed_index, self._trigger.note)
@@ -155,9 +161,9 @@ class Recording:
         except RunError as error:
             self._store_note(message_of(error))
         if self._file is None:  # there is nothing to keep
-            with contextlib.suppress(JournalError):
-                self._journal.close()
-            self._journal.remove()
+            discarding = threading.Thread(target=self._discard_journal, name="closing", daemon=True)
+            discarding.start()
+            discarding.join(_DISCARD_S)
         else:
             self._send_state(messages.PullbackState.CLOSING, self._file.next_index)
             self._file.close(self._ending(self._file))
@@ -176,6 +182,7 @@ class Recording:
 
     def poll(self) -> messages.RunEnded | None:
         """Report what has happened to journal and file; return the run's end once its file is safe."""
+        self._follow_disk()
         moved = self._journal.move_message
         if moved and moved not in self._notes:
             self._store_note(moved)
@@ -193,6 +200,26 @@ class Recording:
         self._ended = result.fault or self._ended
         self._store_note(result.message, first=True)
         return self._run_ended(result.path, file.statistics.losses())
+
+    def _discard_journal(self) -> None:
+        with contextlib.suppress(JournalError):
+            self._journal.close()
+        self._journal.remove()
+
+    def _follow_disk(self) -> None:
+        """Tell of a disk that takes nothing, and end the run where it does not come back soon."""
+        stalled_s = self._journal.stalled_s
+        if stalled_s < _STALL_TOLD_S or self._journal.left is not None:
+            self._is_stall_told = False
+            return
+        if not self._is_stall_told:
+            self._is_stall_told = True
+            template = N_("the disk of {folder} takes nothing any more: check the disk, or its network")
+            self.show_note(message(template, folder=self.directory))
+        if stalled_s > _HANGS_S and not self.is_ending and self._journal.leave_hanging_disk():
+            template = N_("the disk of {folder} has taken nothing for {stalled_s:.0f} s")
+            hangs = message(template, folder=self.directory, stalled_s=stalled_s)
+            self.end(messages.EndReason.WRITE_ERROR, hangs)
 
     def _send_path(self, file: RunFile) -> None:
         error = file.path.exception()

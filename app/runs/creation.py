@@ -7,8 +7,6 @@ exists before the first sample, and values that are known at the end only are fi
 
 import contextlib
 import datetime
-import os
-import secrets
 import tempfile
 from pathlib import Path
 from typing import Literal
@@ -18,7 +16,15 @@ import numpy as np
 
 from app.runs import schema
 from app.runs.blocks import BlockLayout
-from app.runs.disk import MARGIN_BYTES, check_free_space, reserve_space, storage_error
+from app.runs.disk import (
+    MARGIN_BYTES,
+    UNFINISHED_SUFFIX,
+    check_free_space,
+    reserve_space,
+    storage_error,
+    sync_file,
+    unfinished_name,
+)
 from app.runs.errors import RunError
 from app.runs.fields import make_group, reserve_fields
 from app.runs.lock import RECORDING_SUFFIX, FileLock, LockHeldError, is_held, recording_lock
@@ -26,8 +32,7 @@ from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import write_metadata
 from app.runs.schema import Column
 from app.version import __version__
-
-UNFINISHED_SUFFIX = ".making"  # ends the temporary name of a run file. A killed process may leave one.
+from config.durable_files import give_new_name
 
 _CHECK_ROWS = 1000
 _PAGE_BYTES = 4096
@@ -46,7 +51,7 @@ def create_file(path: Path, metadata: RunMetadata, layout: BlockLayout, identifi
     if path.exists():
         raise FileExistsError(str(path))
     check_free_space(path.parent, MARGIN_BYTES)
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}{UNFINISHED_SUFFIX}")
+    temporary = unfinished_name(path)
     try:
         with _open(temporary, "x") as file:
             create_template(file, path.name, metadata, layout, identifier)
@@ -54,7 +59,8 @@ def create_file(path: Path, metadata: RunMetadata, layout: BlockLayout, identifi
             reserve_space(temporary, 0, file.id.get_filesize() + MARGIN_BYTES)
             wire = [column.path for column in schema.WIRE_COLUMNS]
             _create_chunk_indices(file, [*column_paths(metadata, layout), *wire])
-        _give_name(temporary, path)
+        sync_file(temporary)
+        give_new_name(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
     try:
@@ -192,18 +198,6 @@ def _create_chunk_indices(file: h5py.File, growing: list[str]) -> None:
             file[path].resize((rows,))
             file[path][:] = 0
         file.flush()
-
-
-def _give_name(temporary: Path, path: Path) -> None:
-    """Give a file its final name in one step. Raises FileExistsError where something has it."""
-    try:
-        os.link(temporary, path)
-    except FileExistsError:
-        raise
-    except OSError:  # a file system without links
-        if path.exists():
-            raise FileExistsError(str(path)) from None
-        temporary.rename(path)
 
 
 def _open_for_rows(path: Path) -> h5py.File:

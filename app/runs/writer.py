@@ -29,7 +29,7 @@ from app.runs.journal import JournalRecord, JournalSpan, RecordKind, UnreadableJ
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata, RunMetadata
 from app.runs.writer_client import ERRORS, Closed, Failed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand
-from config.durable_files import remove_file, replace_file
+from config.durable_files import remove_file, replace_file, sync_folder
 from drivers.samples import Losses
 from messages.i18n import N_
 
@@ -111,6 +111,7 @@ def write_run(
         stored = writer.close(end)
         if replace:
             replace_file(target, path)
+            sync_folder(path.parent)
     except BaseException as error:
         remove_file(target)
         if isinstance(error, OSError):
@@ -191,7 +192,7 @@ class RunWriter:
             disk.truncate(self.path, size)
             self._verify()
             disk.sync_file(self.path)
-            disk.sync_folder(self.path.parent)
+            sync_folder(self.path.parent)
         except (OSError, RuntimeError) as error:
             self.usable = False
             raise disk.storage_error(self.path, error) from None
