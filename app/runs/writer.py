@@ -74,7 +74,7 @@ def create_run(
     path, layout, lock = path.absolute(), layout or BlockLayout(), recording_lock(path.absolute())
     try:
         lock.acquire()
-        file = create_file(path, metadata, layout, identifier)
+        file = create_file(path, metadata, layout, identifier, has_wire=journal is not None)
     except LockHeldError:
         raise RunExistsError(
             "{path} is being recorded by another program. Choose another name", path=path
