@@ -30,9 +30,7 @@ def main() -> None:
     parser.add_argument("--runs", default="10000,100000")
     chosen = parser.parse_args()
     print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores")
-    print(
-        "| runs | first listing, scaled | listed | filtered | one changed | index | memory, MB |"
-    )
+    print("| runs | first listing, scaled | listed | filtered | one changed | index | memory, MB |")
     print("|---|---|---|---|---|---|---|")
     for count in map(int, chosen.runs.split(",")):
         with tempfile.TemporaryDirectory() as place:

@@ -53,7 +53,7 @@ _STEP_PERIODS_S = {Latency.BATCHED: 0.8, Latency.IDENTIFIED: 0.1}
 """Between two steps that nobody waits for: a step costs about the same for few samples as for many."""
 _WATCHED_PAUSE_S = 0.015
 """Time for bytes to collect in the port before each read; here for a user who is to see them within 50 ms."""
-_PAUSE_S = 0.06
+_PAUSE_S = 0.075
 _AWAITING_PAUSE_S = 0.003
 _ENDED_BY_OPERATOR = (messages.EndReason.STOPPED, messages.EndReason.INTERRUPTED)
 

@@ -82,8 +82,8 @@ def write_text(group: h5py.Group, name: str, text: str) -> None:
         group.create_dataset(name, data=np.bytes_(data), dtype=text_type(data, len(data)))
 
 
-def text_type(data: bytes, size: int) -> np.dtype[Any]:
-    """Type of a text of `size` bytes: ASCII where that holds it, as `load` of Octave reads no UTF-8."""
+def text_type(data: bytes, size: int) -> Any:
+    """Type (numpy) of a text of `size` bytes: ASCII where that holds it, as `load` of Octave reads no UTF-8."""
     return h5py.string_dtype("ascii" if data.isascii() else "utf-8", size)
 
 

@@ -119,9 +119,9 @@ class SlidingWindow:
     def stationary(self, duration_s: float, tolerance_m: float) -> StationaryLevel | None:
         return stationary_level(self.latest(duration_s), duration_s * self._rate_hz, tolerance_m)
 
-    def drift_m_per_s(self, duration_s: float, bound_m_per_s: float) -> float:
-        """Rate of drift; 0 as long as that is within a bound, or hidden in the noise."""
-        rate, error = (self._rate_hz * value for value in drift(self.latest(duration_s)))
+    def drift_m_per_s(self, duration_s: float, bound_m_per_s: float, noise: float | None = None) -> float:
+        """Rate of drift; 0 as long as that is within a bound, or hidden in the noise (m), if that is known."""
+        rate, error = (self._rate_hz * value for value in drift(self.latest(duration_s), noise))
         return rate if abs(rate) > bound_m_per_s + _DRIFT_ERRORS * error else 0.0
 
     def _all(self) -> Floats:
@@ -171,13 +171,14 @@ def stationary_level(stretch: Floats, span: float, tolerance_m: float) -> Statio
     return StationaryLevel(mean_m(stretch), noise, float(stretch[0, 0]))
 
 
-def drift(stretch: Floats) -> tuple[float, float]:
+def drift(stretch: Floats, noise: float | None = None) -> tuple[float, float]:
     """Slope of a stretch (n, 2) by least squares, and its standard error: infinite below eight readings."""
     if len(stretch) < 2 * _PARTS:
         return 0.0, math.inf
     index = stretch[:, 0] - stretch[:, 0].mean()
     spread = float(index @ index)
-    return float(index @ stretch[:, 1]) / spread, noise_m(stretch[:, 1]) / math.sqrt(spread)
+    noise = noise_m(stretch[:, 1]) if noise is None else noise
+    return float(index @ stretch[:, 1]) / spread, noise / math.sqrt(spread)
 
 
 def fit_parabola_start(falling: Floats) -> float:

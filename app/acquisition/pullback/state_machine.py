@@ -176,24 +176,24 @@ class PullbackStateMachine:
             self._add_rest(index, level)
 
     def _add_rest(self, index: float, level: StationaryLevel) -> None:
-        if self._readings.table.drift_m_per_s(_ZERO_S, _DRIFT_M_PER_S):
+        if self._readings.table.drift_m_per_s(_ZERO_S, _DRIFT_M_PER_S, level.noise_m):
             return
         is_first = not self._rest.has_levels and self.measurement.zero_m is None
         if is_first and abs(level.mean_m) > _PULLED * self._plan.nominal_m:
             self._is_pulled = True
             self._enter(PullbackState.PULLING, index, ALREADY_PULLED_NOTE, is_stored=True)
             return
-        if self._is_plate_moving(index):
+        relative_m = self._readings.relative.mean(_ZERO_S, index)
+        if not math.isnan(relative_m) and self._is_plate_moving():
             self._rest.reset()
             return
-        self._rest.add(ZeroLevel(level.since, level.mean_m, self._readings.relative.mean(_ZERO_S, index)))
+        self._rest.add(ZeroLevel(level.since, level.mean_m, relative_m))
         if self._rest.is_known:
             self._set_zero(self._rest.latest)
             self._check_plate(index)
 
-    def _is_plate_moving(self, index: float) -> bool:
-        is_seen = not math.isnan(self._readings.relative.mean(_ZERO_S, index))
-        return is_seen and self._readings.relative.stationary(_ZERO_S, _CREEP * self._plan.nominal_m) is None
+    def _is_plate_moving(self) -> bool:
+        return self._readings.relative.stationary(_ZERO_S, _CREEP * self._plan.nominal_m) is None
 
     def _check_plate(self, index: float) -> None:
         room, plate_m = self._room, math.nan if self.measurement.plate_m is None else self.measurement.plate_m
