@@ -83,7 +83,7 @@ def write_text(group: h5py.Group, name: str, text: str) -> None:
 
 
 def text_type(data: bytes, size: int) -> Any:
-    """Type (numpy) of a text of `size` bytes: ASCII where that holds it, as `load` of Octave reads no UTF-8."""
+    """Type of a text of `size` bytes: ASCII where that holds it, as Octave's `load` reads no UTF-8."""
     return h5py.string_dtype("ascii" if data.isascii() else "utf-8", size)
 
 

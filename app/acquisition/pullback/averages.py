@@ -120,7 +120,7 @@ class SlidingWindow:
         return stationary_level(self.latest(duration_s), duration_s * self._rate_hz, tolerance_m)
 
     def drift_m_per_s(self, duration_s: float, bound_m_per_s: float, noise: float | None = None) -> float:
-        """Rate of drift; 0 as long as that is within a bound, or hidden in the noise (m), if that is known."""
+        """Rate of drift; 0 as long as that is within a bound, or hidden in the noise (m), where known."""
         rate, error = (self._rate_hz * value for value in drift(self.latest(duration_s), noise))
         return rate if abs(rate) > bound_m_per_s + _DRIFT_ERRORS * error else 0.0
 
