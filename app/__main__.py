@@ -42,9 +42,23 @@ def _run() -> None:
 
         sys.exit(run_window(run=arguments[0]))
     else:
+        if _is_brief_simulation(arguments):
+            from analysis.compiled import interpret
+
+            interpret()
         from app.cli import run
 
         run()
+
+
+_LONG = ("--effect", "--method", "--step", "--duration", "--rate")
+"""Options of `simulate` with which compiled code may be worth its loading."""
+
+
+def _is_brief_simulation(arguments: list[str]) -> bool:
+    is_long = any(argument.startswith(_LONG) for argument in arguments)
+    writes_run = any(argument.lower().endswith(".h5") for argument in arguments)
+    return arguments[:1] == ["simulate"] and not is_long and not writes_run
 
 
 def _run_if_child(arguments: list[str]) -> list[str]:

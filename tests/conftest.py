@@ -103,6 +103,9 @@ Slipstand = Callable[..., Outcome]
 def slipstand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Slipstand:
     """Run `slipstand ARGUMENTS` and return how it ended."""
 
+    # A process of its own may leave functions uncompiled; this one goes on with other tests.
+    monkeypatch.setattr("app.__main__._is_brief_simulation", lambda _arguments: False)
+
     def run(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["slipstand", *map(str, arguments)])
         capsys.readouterr()

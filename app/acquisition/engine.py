@@ -7,9 +7,11 @@ stored, and the process ends.
 
 import datetime
 import logging
+import math
 import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -48,12 +50,12 @@ _HISTORY_S = 10.0  # time of samples that are kept before a run
 _AFTER_PRETRIGGER_S = 4.0
 """The history reaches so much further back than a pretrigger: a release is confirmed only after a while."""
 _CONNECT_S = 60.0  # the owner must send the first command within this time
-_HEALTH_PERIOD_S = 0.5
-_STEP_PERIOD_S = 0.1
+_HEALTH_PERIOD_S = 0.4
+_STEP_PERIODS_S = {Latency.BATCHED: 0.8, Latency.IDENTIFIED: 0.1}
 """Between two steps that nobody waits for: a step costs about the same for few samples as for many."""
 _WATCHED_PAUSE_S = 0.015
 """Time for bytes to collect in the port before each read; here for a user who is to see them within 50 ms."""
-_PAUSE_S = 0.04
+_PAUSE_S = 0.075
 _AWAITING_PAUSE_S = 0.003
 _ARMING_WAIT_S = 0.3  # a disk that works makes a journal in some milliseconds
 _ARMING_S = 5.0
@@ -72,11 +74,12 @@ class PollSchedule:
             return _AWAITING_PAUSE_S
         return _WATCHED_PAUSE_S if self._is_watched else _PAUSE_S
 
-    def wait(self, latency: Latency) -> None:
-        if latency is not Latency.BATCHED or self._is_watched:
+    def wait(self, latency: Latency, wait: Callable[[float], object], longest_s: float = math.inf) -> None:
+        """Wait for the next step by `wait`, which takes seconds and may return earlier."""
+        if self._is_watched or latency not in _STEP_PERIODS_S:
             return
-        time.sleep(max(0.0, self._due_s - time.perf_counter()))
-        self._due_s = time.perf_counter() + _STEP_PERIOD_S
+        wait(max(0.0, min(self._due_s - time.perf_counter(), longest_s)))
+        self._due_s = time.perf_counter() + _STEP_PERIODS_S[latency]
 
 
 class Engine:
@@ -149,7 +152,8 @@ class Engine:
     def _step(self) -> None:
         latency = self._latency()
         self._stream.set_read_pause(self._poll_schedule.pause_s(latency))
-        self._poll_schedule.wait(latency)
+        ends_s = math.inf if self._recording is None else self._recording.ends_s
+        self._poll_schedule.wait(latency, self._commands.wait, ends_s)
         self._take_reads()
         self._follow_stream()
         while (command := self._commands.take()) is not None:

@@ -1,6 +1,7 @@
 """One run from arming to its end. The trigger decides when it begins and ends; here it is carried out."""
 
 import contextlib
+import math
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -40,7 +41,8 @@ _FOLLOW_S = 0.07
 class Latency(Enum):
     """How soon new samples must be processed."""
 
-    BATCHED = auto()  # nobody at the stand waits for it
+    BATCHED = auto()  # nobody waits for it
+    IDENTIFIED = auto()  # the live identification follows the motion; nobody at the stand waits
     INTERACTIVE = auto()  # it may call for the operator's next step
     IMMEDIATE = auto()  # the table is held and may be released, which must be reported at once
 
@@ -113,8 +115,15 @@ class Recording:
     def latency(self) -> Latency:
         if self._trigger.awaits_release:
             return Latency.IMMEDIATE
-        is_free = self.is_unattended or self._settings.trigger == "none"
-        return Latency.BATCHED if is_free else Latency.INTERACTIVE
+        if self.confirmed_start_index is not None:
+            return Latency.IDENTIFIED
+        return Latency.BATCHED if self._settings.trigger == "none" else Latency.INTERACTIVE
+
+    @property
+    def ends_s(self) -> float:
+        """Time until the samples of the run are complete; infinite where only a motion ends it."""
+        end = self._trigger.end
+        return math.inf if end is None else (end[0] - self._history.next_index) / self._rate_hz
 
     @property
     def confirmed_start_index(self) -> int | None:
@@ -141,7 +150,7 @@ class Recording:
             return
         self._pending += reads
         new = self._history.next_index - self._followed_index
-        if self.latency is not Latency.BATCHED or new >= _FOLLOW_S * self._rate_hz:
+        if self.latency not in (Latency.BATCHED, Latency.IDENTIFIED) or new >= _FOLLOW_S * self._rate_hz:
             self._follow_pending()
 
     def end(self, reason: messages.EndReason, message: Message = EMPTY, *, keep_rest: bool = True) -> None:
