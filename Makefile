@@ -17,7 +17,10 @@ FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 # A window system, its window manager, and hands of an operator, for tests of the window.
 DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 
-.PHONY: docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
+# What logs the system calls that the drill of a power cut rebuilds disks from, and mounts a disk that hangs.
+TEST_PACKAGES := strace bindfs
+
+.PHONY: audit licences wheel drill-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -31,6 +34,7 @@ help:
 	@echo "make drill   kills, pulled cables, full disks, rubbish: an hour (docs/reliability.md)"
 	@echo "make peers   drivers, simulated devices and firmware against programs that are not ours (docs/peers.md)"
 	@echo "make windows  demo, ports, window and tests on Windows' Python under Wine, as root (docs/systems.md); the first time half an hour"
+	@echo "make drill-tools   what logs system calls and mounts a disk that hangs, for drills; their tests are skipped without"
 	@echo "make firmware-tools, make firmware   the Arduino's compiler and simulator; the firmware (firmware/README.md)"
 	@echo "make desktop-tools   window system and manager for the test of a day in the window, which is skipped without them"
 	@echo "make packages   wheel, tarball and Debian package, or on Windows the installer, into dist (packaging/README.md)"
@@ -38,6 +42,8 @@ help:
 	@echo "make try-packages   them installed, used and removed on bare Debian 12 and 13, as root; half an hour"
 	@echo "make quick-test PYTHON=python3.13   some tests with another Python, in half a minute"
 	@echo "make screenshots   pictures of every screen into docs/screenshots"
+	@echo "make audit   known vulnerabilities of the locked packages, by the advisories of PyPI"
+	@echo "make licences, make wheel   docs/licences.md; the wheel with its bill of materials (CycloneDX) into dist"
 	@echo "make docs    the documentation site into docs/_build/html, which needs no network"
 	@echo "make translations   new texts into the catalogues of messages/locale"
 
@@ -54,6 +60,9 @@ $(READY): requirements.lock pyproject.toml setup.py | system-libraries
 system-libraries:
 	@$(call install_packages,$(QT_PACKAGES),test -x $(BIN)/python || $(PYTHON) -c 'import ensurepip' 2>/dev/null || \
 		missing="$$missing $$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')")
+
+drill-tools:
+	@$(call install_packages,$(TEST_PACKAGES),true)
 
 firmware-tools:
 	@$(call install_packages,$(FIRMWARE_PACKAGES),true)
@@ -132,15 +141,18 @@ bench-desktop: setup
 	@for script in desktop desktop_handle; do \
 		echo "== benchmarks/$$script.py"; $(BIN)/python benchmarks/$$script.py || exit 1; done
 
-drill: setup
+drill: setup drill-tools
 	$(BIN)/python -m tests.drills.kill_engine --count 200
 	$(BIN)/python -m tests.drills.kill_window --count 50
 	$(BIN)/python -m tests.drills.unplug --count 100
 	$(BIN)/python -m tests.drills.disk_full --count 50
 	$(BIN)/python -m tests.drills.starved --count 14
+	$(BIN)/python -m tests.drills.hanging_disk --count 10
+	$(BIN)/python -m tests.drills.power_loss --count 2000
 	$(BIN)/python -m tests.drills.damaged_runs --count 10000
 	$(BIN)/python -m tests.drills.hostile_texts --count 20000
 	$(BIN)/python -m tests.drills.oversized_files
+	$(BIN)/python -m tests.drills.hostile_wire
 	$(BIN)/python -m tests.drills.hostile_bytes --megabytes 1000 --frames 1000000
 
 peers: setup
@@ -158,6 +170,24 @@ packages: setup
 try-packages: setup
 	@$(call install_packages,debootstrap xvfb imagemagick,true)
 	$(BIN)/python -m tools.packages.checks
+
+# Beside the virtual environment, so that its packages stay those of the lock.
+$(VENV)/tools/.ready:
+	$(PYTHON) -m venv $(VENV)/tools
+	$(VENV)/tools/bin/python -m pip install --quiet --disable-pip-version-check pip-audit pip-licenses cyclonedx-bom build
+	@touch $@
+
+audit: $(VENV)/tools/.ready
+	$(VENV)/tools/bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
+
+licences: setup $(VENV)/tools/.ready
+	@{ printf '# Licences\n\nOf the packages of `requirements.lock`, those for development included, as they state them. Made by `make licences`.\n\n'; \
+		$(VENV)/tools/bin/pip-licenses --python $(BIN)/python --ignore-packages slipstand --format=markdown --with-urls | sed 's/  */ /g; /^|-/s/--*/---/g'; } >docs/licences.md
+
+# The wheel into dist/, and beside it what it is made of, in the form of CycloneDX.
+wheel: setup $(VENV)/tools/.ready
+	$(VENV)/tools/bin/python -m build --wheel --outdir dist
+	$(VENV)/tools/bin/cyclonedx-py requirements --pyproject pyproject.toml --output-reproducible --of JSON -o dist/slipstand.cdx.json requirements.lock
 
 docs: setup
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html

@@ -11,10 +11,25 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, ParamSpec, TypeVar, cast
 
-from numba import njit
-
 Parameters = ParamSpec("Parameters")
 Result = TypeVar("Result")
+
+
+class _Interpretation:
+    """Whether functions are left as they are written."""
+
+    is_on = False
+
+
+_interpretation = _Interpretation()
+
+
+def interpret() -> None:
+    """Leave the functions of modules that are imported from now on uncompiled; their results are the same.
+
+    For a process that calls few of them, and briefly: to load numba and what is compiled takes half a second.
+    """
+    _interpretation.is_on = True
 
 
 def compiled(function: Callable[Parameters, Result]) -> Callable[Parameters, Result]:
@@ -64,6 +79,10 @@ def compile_with(
 
 
 def _kept(function: Callable[Parameters, Result], options: dict[str, Any]) -> Callable[Parameters, Result]:
+    if _interpretation.is_on:
+        return function
+    from numba import njit  # takes as long to import as a whole small command
+
     dispatcher: Any = njit(nogil=True, cache=True, error_model="numpy", **options)(function)
     index = dispatcher._cache._cache_file
     index._source_stamp = (index._source_stamp, _sources())

@@ -305,6 +305,7 @@ class CommandReader(Generic[Command]):
         self._decode = decode
         self._on_closed = on_closed
         self._commands: queue.Queue[Command | None] = queue.Queue(queue_size)
+        self._arrived = threading.Event()
         self._is_closed = False
         threading.Thread(target=self._read, name="commands", daemon=True).start()
 
@@ -323,9 +324,14 @@ class CommandReader(Generic[Command]):
         """Tell whether `take` has come to the end of the pipe: the parent has gone or closed it."""
         return self._is_closed
 
+    def wait(self, timeout_s: float) -> None:
+        """Wait until a command or the end of the pipe has come since `take` found none, at most so long."""
+        self._arrived.wait(timeout_s)
+
     def take(self, timeout_s: float = 0.0) -> Command | None:
         if self._is_closed:
             return None
+        self._arrived.clear()  # before the queue is looked at: what comes after that sets it again
         try:
             command = self._commands.get(block=timeout_s > 0.0, timeout=timeout_s or None)
         except queue.Empty:
@@ -338,10 +344,12 @@ class CommandReader(Generic[Command]):
             while data := os.read(self._descriptor, READ_BYTES):
                 for command in self._decode(data):
                     self._commands.put(command)
+                    self._arrived.set()
         except (OSError, ValueError) as error:
             _log.warning("commands: %s", error)
         self._on_closed()
         self._commands.put(None)
+        self._arrived.set()
 
 
 class EventSender(Generic[Event]):

@@ -1,5 +1,7 @@
 """Changes of files that last through a power cut, and that wait for other programs to let go of a file."""
 
+import contextlib
+import errno
 import os
 import re
 import sys
@@ -15,6 +17,7 @@ _RETRY_S = 0.05
 _ACCESS_DENIED = 5
 """What Windows reports of a file that is to be replaced while it is open: of missing rights too."""
 _IN_USE = (32, 33)  # sharing and lock violation of Windows
+_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EPERM)
 _HDF5_IN_USE = re.compile(r"GetLastError\(\) = (32|33)\b")
 
 
@@ -47,6 +50,32 @@ def replace_file(source: Path, target: Path) -> None:
     _wait_for_others(lambda: source.replace(target), source, target)
 
 
+def give_new_name(source: Path, target: Path) -> None:
+    """Give a file a name that nothing has, in one step; nothing is overwritten, and no cut loses the file.
+
+    Waits like `replace_file`. Raises FileExistsError, FileInUseError, OSError.
+    """
+    if sys.platform == "win32":  # where `rename` replaces nothing
+        _wait_for_others(lambda: source.rename(target), source)
+        return
+    try:
+        os.link(source, target)
+    except FileExistsError:
+        raise
+    except OSError:  # a file system without links, or another user's file
+        target.open("x").close()
+        try:
+            source.replace(target)
+        except OSError:
+            target.unlink()
+            raise
+        return
+    if source.parent != target.parent:  # before a cut can make the removal of the old name last alone
+        with contextlib.suppress(OSError):
+            sync_folder(target.parent)
+    source.unlink()
+
+
 def remove_file(path: Path) -> None:
     """Remove a file, if it is there; waits like `replace_file`. Raises FileInUseError, OSError."""
     _wait_for_others(lambda: path.unlink(missing_ok=True), path)
@@ -66,6 +95,29 @@ def sync_descriptor(descriptor: int) -> None:
             os.fsync(descriptor)
     else:
         os.fsync(descriptor)
+
+
+def sync_folder(folder: Path) -> None:
+    """Bring the names in a folder to disk where system, share and rights allow it. Raises OSError."""
+    if sys.platform == "win32":
+        return
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            sync_descriptor(handle)
+        finally:
+            os.close(handle)
+    except OSError as error:
+        if error.errno not in _CANNOT_SYNC:
+            raise
+
+
+def make_folders(folder: Path) -> None:
+    """Make a folder with its parents, so that they last through a power cut. Raises OSError."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in reversed(missing):
+        sync_folder(path.parent)
 
 
 def _wait_for_others(change: Callable[[], object], *paths: Path) -> None:

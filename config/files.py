@@ -15,7 +15,15 @@ import msgspec
 import platformdirs
 
 from config import schema
-from config.durable_files import FileInUseError, file_in_use, replace_file, sync_descriptor
+from config.durable_files import (
+    FileInUseError,
+    file_in_use,
+    give_new_name,
+    make_folders,
+    replace_file,
+    sync_descriptor,
+    sync_folder,
+)
 from config.schema import ConfigError, Gauge, GaugeCheck, GaugeChecks, Gauges, PublishedRow, Settings, Stand
 from messages.i18n import N_
 
@@ -79,7 +87,7 @@ def save_stand(stand: Stand) -> Path:
         load_stand(source)  # a file that cannot be read is not written over
         document = tomlkit.parse(source.read_text(encoding="utf-8"))
         _merge(document, _stated(stand, document))
-        target.parent.mkdir(parents=True, exist_ok=True)
+        make_folders(target.parent)
         _replace(target, tomlkit.dumps(document))
     return target
 
@@ -108,7 +116,7 @@ def save_calibration(
         return _write_dated(f"gauges-{day.isoformat()}", text)
     with _writing(path):
         try:
-            _write(path, text, "x")
+            _write_new(path, text)
         except FileExistsError:
             template = N_("{path} exists already and is not overwritten. Choose another name")
             raise ConfigError(template, path=path) from None
@@ -198,9 +206,9 @@ def append_check(check: GaugeCheck) -> Path:
     entry = {name: value for name, value in msgspec.structs.asdict(check).items() if value not in ("", ())}
     entry = {name: list(value) if isinstance(value, tuple) else value for name, value in entry.items()}
     with _writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        before = "\n" if path.exists() else _CHECKS_TITLE
-        _write(path, f"{before}[[check]]\n{tomlkit.dumps(entry)}", "a")
+        make_folders(path.parent)
+        before = f"{path.read_text(encoding='utf-8')}\n" if path.exists() else _CHECKS_TITLE
+        _replace(path, f"{before}[[check]]\n{tomlkit.dumps(entry)}")
     return path
 
 
@@ -266,18 +274,18 @@ def _save(path: Path, values: dict[str, Any], kind: type[T], day: datetime.date)
                 aside = _free_name(f"{path.stem}-unreadable-{day.isoformat()}")
                 replace_file(path, aside)
         document.update(values)
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folders(path.parent)
         _replace(path, tomlkit.dumps(document))
     return aside
 
 
 def _write_dated(stem: str, text: str) -> Path:
     with _writing(config_directory()):
-        config_directory().mkdir(parents=True, exist_ok=True)
+        make_folders(config_directory())
         while True:
             path = _free_name(stem)
             with contextlib.suppress(FileExistsError):  # another process took it just now
-                _write(path, text, "x")
+                _write_new(path, text)
                 return path
 
 
@@ -289,12 +297,26 @@ def _free_name(stem: str) -> Path:
 
 def _replace(path: Path, text: str) -> None:
     beside = path.with_suffix(".toml.new")
-    _write(beside, text, "w")
+    _write(beside, text)
     replace_file(beside, path)
+    sync_folder(path.parent)
 
 
-def _write(path: Path, text: str, mode: str) -> None:
-    with path.open(mode, encoding="utf-8", newline="") as file:
+def _write_new(path: Path, text: str) -> None:
+    """Write a file that has its name once it is on disk. Raises FileExistsError, OSError."""
+    if path.exists():
+        raise FileExistsError(str(path))
+    beside = path.with_name(f"{path.name}.{os.getpid()}.new")
+    _write(beside, text)
+    try:
+        give_new_name(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+    sync_folder(path.parent)
+
+
+def _write(path: Path, text: str) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
         file.write(text)
         file.flush()
         sync_descriptor(file.fileno())

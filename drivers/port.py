@@ -17,7 +17,7 @@ from serial.tools import list_ports as serial_list_ports
 
 from drivers import lsl_link
 from drivers.errors import DeviceLostError, DriverError, PortUnavailableError, SettingsError
-from drivers.source import LineSettings, Link
+from drivers.source import CollectLimit, LineSettings, Link
 from messages.i18n import N_
 
 _log = logging.getLogger(__name__)
@@ -32,6 +32,10 @@ _MAX_READ_BYTES = 1 << 16
 _TERMINAL_BYTES = 1024
 """A terminal that returns so many bytes at once may hold more."""
 _MAX_TERMINAL_READS = 16
+_PSEUDO_TERMINAL_LIMIT = CollectLimit(3584, 3584)
+"""Linux holds 20 kB of a pseudo-terminal, and one read returns 4 kB at most."""
+_SOCKET_LIMIT = CollectLimit(1 << 15, 1 << 15)
+"""A connection holds at least so much, and then its sender waits."""
 _WINDOWS_BUFFER_BYTES = 1 << 18
 """Receive buffer asked for on Windows, whose default of 4 kB lasts 90 ms at 460800 baud."""
 
@@ -44,7 +48,8 @@ else:
     PLATFORM_ERRORS: tuple[type[Exception], ...] = (OSError, ValueError, OverflowError, _termios_error)
 
 _WINDOWS_PORT = re.compile(r"(?:[\\/]{2}\.[\\/])?(COM\d+)", re.IGNORECASE)
-_PSEUDO_TERMINALS = ("/dev/pts/", "/dev/ttys")  # of Linux and of macOS; ports of Linux are ttyS0
+_LINUX_PSEUDO_TERMINALS = "/dev/pts/"
+_PSEUDO_TERMINALS = (_LINUX_PSEUDO_TERMINALS, "/dev/ttys")  # also those of macOS; ports of Linux are ttyS0
 _BUSY = (errno.EBUSY, errno.EAGAIN)
 _ABSENT = (errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.EIO)
 _DENIED = (errno.EACCES, errno.EPERM)
@@ -248,6 +253,13 @@ class Port:
         return self._is_socket
 
     @property
+    def collect_limit(self) -> CollectLimit:
+        if self._is_socket:
+            return _SOCKET_LIMIT
+        is_pseudo_terminal = device_path(self.url).startswith(_LINUX_PSEUDO_TERMINALS)
+        return _PSEUDO_TERMINAL_LIMIT if is_pseudo_terminal else CollectLimit()
+
+    @property
     def has_baud(self) -> bool:
         """Whether the baud rate has an effect; it has none on a network or a pseudo-terminal."""
         return "://" not in self.url and not device_path(self.url).startswith(_PSEUDO_TERMINALS)
@@ -424,14 +436,14 @@ def port_busy_error(url: str, users: list[PortUser]) -> PortUnavailableError:
 
 
 _UNREACHABLE = {
+    "name or service|getaddrinfo|nodename": N_(
+        "{port} is not known in this network: check how the address is written"
+    ),
     "not known": N_(
         "{port} is no kind of port that is known: give a device, socket://host:port or rfc2217://host:port"
     ),
     "refused": N_(
         "{port} refuses: nothing listens there, start the device's server or check the port number"
-    ),
-    "name or service|getaddrinfo|nodename": N_(
-        "{port} is not known in this network: check how the address is written"
     ),
     "": N_("{port} does not answer: check address, port number, network and power of the device"),
 }  # by what pyserial and the systems write

@@ -12,6 +12,17 @@ from drivers.samples import Losses, SampleBlock
 from messages.message import Message
 
 
+@dataclass(frozen=True, slots=True)
+class CollectLimit:
+    """How many bytes may collect in a port before they are read, so that a late read loses none.
+
+    The defaults suit any port: the smallest buffers of systems and adapters hold 4 kB.
+    """
+
+    calm_bytes: int = 2048
+    busy_bytes: int = 512  # on a busy computer, where a sleep ends late
+
+
 class Link(Protocol):
     """An open byte connection; `drivers.port.Port` is one."""
 

@@ -18,7 +18,7 @@ from drivers.errors import DeviceLostError, NoDataError, ProtocolError, QueueFul
 from drivers.host_time import ArrivalRate, host_ns
 from drivers.recognition import describe_unreadable
 from drivers.samples import ChannelFilter, DeviceIdentity, Losses, SampleBlock
-from drivers.source import Decoder, Link
+from drivers.source import CollectLimit, Decoder, Link
 from messages.i18n import N_
 from messages.message import EMPTY, Message, MessageError, message, message_of
 
@@ -58,6 +58,8 @@ class SampleSource(ABC):
 
     batch_delay_s = 0.0
     """How long `read` may let bytes collect (s); set by the caller. Polled devices ignore it."""
+    collect_limit = CollectLimit()
+    """How many bytes may collect before `read` reads them; set by the caller."""
     stop_command = b""  # what asks the device to stop sending
     is_polled = False  # whether the device is polled on a grid of the host's clock, see `set_poll_rate`
     timeout_s = 3.0  # how long `start` waits for the first good data
@@ -134,7 +136,7 @@ class SampleSource(ABC):
 
         A polled device is asked once, when its poll is due. One thread may call this while another decodes.
         """
-        return self._reader.read(link, self.batch_delay_s)
+        return self._reader.read(link, self.batch_delay_s, self.collect_limit)
 
     def stop(self, link: Link) -> None:
         """Send the stop command, if the device has one; nothing happens where it is gone."""
@@ -284,9 +286,7 @@ def check_gauge_channels(table: int, relative: int, allowed: range) -> None:
         raise SettingsError(template, channel=table)
 
 
-_SAFE_BYTES = 2048
-"""Bytes that may collect before they are read: the smallest buffers of systems and adapters hold 4 kB."""
-_BUSY_BYTES = 512  # the same on a busy computer, where a sleep ends late
+_LIMIT = CollectLimit()
 _BUSY_DELAY_S = 0.002
 _LATE_S = 0.005
 """A sleep that lasts so much longer than asked shows a busy computer. Quiet ones wake up within 1 ms."""
@@ -312,13 +312,15 @@ class BatchedReader:
         self._bytes_per_s = _INITIAL_BYTES_PER_S
         self._ended_s = self._waited_s = time.perf_counter()
         self._busy_until_s = 0.0
+        self._limit = _LIMIT
 
-    def read(self, link: Link, batch_delay_s: float) -> bytes:
+    def read(self, link: Link, batch_delay_s: float, limit: CollectLimit = _LIMIT) -> bytes:
         """What came, or comes within the next 50 ms; b"" if nothing. Raises DeviceLostError.
 
-        Bytes collect for `batch_delay_s`, or less where they would be too many for the port. What came before
-        the port was gone is returned by the call before.
+        Bytes collect for `batch_delay_s`, or less where they would be more than `limit`. What came before the
+        port was gone is returned by the call before.
         """
+        self._limit = limit
         parts: list[bytes] = []
         try:
             self._fetch(link, batch_delay_s, parts)
@@ -349,8 +351,8 @@ class BatchedReader:
 
     def _longest_delay_s(self) -> float:
         if time.perf_counter() < self._busy_until_s:
-            return max(_BUSY_BYTES / self._bytes_per_s, _BUSY_DELAY_S)
-        return _SAFE_BYTES / self._bytes_per_s
+            return max(self._limit.busy_bytes / self._bytes_per_s, _BUSY_DELAY_S)
+        return self._limit.calm_bytes / self._bytes_per_s
 
     def _sleep(self, duration_s: float) -> None:
         due_s = time.perf_counter() + duration_s

@@ -79,21 +79,27 @@ class DiskSpaceMonitor:
     """
 
     def __init__(self, folder: Path | None) -> None:
-        self._folder = folder
         self._demand: DiskDemand | None = None
         self._is_warned = False
         self.free_bytes: int | None = None  # of the folder that is followed; None if unknown
         self._changing = threading.Lock()
         self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._poll, name="free space", daemon=True)
-        self._thread.start()
+        self._follow(folder, None)
 
     def begin(self, folder: Path, demand: DiskDemand) -> None:
-        """Follow the folder in which a run is recorded."""
+        """Follow the folder in which a run is recorded; waits for its disk."""
+        free = free_bytes(folder)
         self._demand, self._is_warned = demand, False
+        self._follow(folder, free)
+
+    def _follow(self, folder: Path | None, free: int | None) -> None:
+        """Follow another folder by another thread: the disk of the one before may hang."""
         with self._changing:
-            self._folder = folder
-            self.free_bytes = free_bytes(folder)
+            self._stopping.set()
+            self._folder, self.free_bytes, self._stopping = folder, free, threading.Event()
+        followed = folder, self._stopping
+        self._thread = threading.Thread(target=self._poll, args=followed, name="free space", daemon=True)
+        self._thread.start()
 
     def check(self, journal_bytes: int) -> Message:
         """Return a new warning for the run, or EMPTY. Raises DiskSpaceError when it must end."""
@@ -117,14 +123,13 @@ class DiskSpaceMonitor:
         """End, without waiting for a disk that hangs."""
         self._stopping.set()
 
-    def _poll(self) -> None:
-        while not self._stopping.is_set():
-            folder = self._folder
+    def _poll(self, folder: Path | None, stopping: threading.Event) -> None:
+        while not stopping.is_set():
             free = None if folder is None else free_bytes(folder)
             with self._changing:
-                if folder == self._folder:
+                if not stopping.is_set():
                     self.free_bytes = free
-            self._stopping.wait(_POLL_PERIOD_S)
+            stopping.wait(_POLL_PERIOD_S)
 
 
 def _megabytes(size: float) -> str:

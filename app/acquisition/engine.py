@@ -7,16 +7,20 @@ stored, and the process ends.
 
 import datetime
 import logging
+import math
 import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from msgspec.structs import replace
 
 from app.acquisition import messages, run_setup
+from app.acquisition.arming import Arming
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor, check_disk_space
 from app.acquisition.errors import AcquisitionError, DiskSpaceError, JournalError, StreamEndedError
+from app.acquisition.journal.journal import Journal
 from app.acquisition.live_client import LiveIdentifier
 from app.acquisition.pullback.plan import ObservedSlip
 from app.acquisition.recording import Latency, Recording, RecordingContext
@@ -46,13 +50,15 @@ _HISTORY_S = 10.0  # time of samples that are kept before a run
 _AFTER_PRETRIGGER_S = 4.0
 """The history reaches so much further back than a pretrigger: a release is confirmed only after a while."""
 _CONNECT_S = 60.0  # the owner must send the first command within this time
-_HEALTH_PERIOD_S = 0.5
-_STEP_PERIOD_S = 0.1
+_HEALTH_PERIOD_S = 0.4
+_STEP_PERIODS_S = {Latency.BATCHED: 0.8, Latency.IDENTIFIED: 0.1}
 """Between two steps that nobody waits for: a step costs about the same for few samples as for many."""
 _WATCHED_PAUSE_S = 0.015
 """Time for bytes to collect in the port before each read; here for a user who is to see them within 50 ms."""
-_PAUSE_S = 0.04
+_PAUSE_S = 0.075
 _AWAITING_PAUSE_S = 0.003
+_ARMING_WAIT_S = 0.3  # a disk that works makes a journal in some milliseconds
+_ARMING_S = 5.0
 _ENDED_BY_OPERATOR = (messages.EndReason.STOPPED, messages.EndReason.INTERRUPTED)
 
 
@@ -68,11 +74,12 @@ class PollSchedule:
             return _AWAITING_PAUSE_S
         return _WATCHED_PAUSE_S if self._is_watched else _PAUSE_S
 
-    def wait(self, latency: Latency) -> None:
-        if latency is not Latency.BATCHED or self._is_watched:
+    def wait(self, latency: Latency, wait: Callable[[float], object], longest_s: float = math.inf) -> None:
+        """Wait for the next step by `wait`, which takes seconds and may return earlier."""
+        if self._is_watched or latency not in _STEP_PERIODS_S:
             return
-        time.sleep(max(0.0, self._due_s - time.perf_counter()))
-        self._due_s = time.perf_counter() + _STEP_PERIOD_S
+        wait(max(0.0, min(self._due_s - time.perf_counter(), longest_s)))
+        self._due_s = time.perf_counter() + _STEP_PERIODS_S[latency]
 
 
 class Engine:
@@ -109,6 +116,7 @@ class Engine:
             str(ring.path), lambda first: stream.time_base(first, self._history.next_index, recent=True)
         )
         self._recording: Recording | None = None
+        self._arming: Arming | None = None
         self._sequence = run_setup.RunSequence()
         self._last_slip: ObservedSlip | None = None
         self._sleep_prevention = SleepPrevention()
@@ -132,7 +140,10 @@ class Engine:
             self._sleep_prevention.end()
             self._disk.stop()
             self._live.stop()
-            self._writer.stop()
+            if self._writer.failure is None:
+                self._writer.stop()
+            else:
+                self._writer.abandon()
 
     def ask_to_quit(self) -> None:
         """Make `run` end a run, keep it, and return; may be called at any moment, as by a signal."""
@@ -141,11 +152,13 @@ class Engine:
     def _step(self) -> None:
         latency = self._latency()
         self._stream.set_read_pause(self._poll_schedule.pause_s(latency))
-        self._poll_schedule.wait(latency)
+        ends_s = math.inf if self._recording is None else self._recording.ends_s
+        self._poll_schedule.wait(latency, self._commands.wait, ends_s)
         self._take_reads()
         self._follow_stream()
         while (command := self._commands.take()) is not None:
             self._execute(command)
+        self._follow_arming()
         if self._is_asked_to_quit:
             self._is_quitting = True
             self._end_all(messages.EndReason.STOPPED)
@@ -199,42 +212,65 @@ class Engine:
                 raise AcquisitionError("this engine is connected already: start another one for another port")
 
     def _begin(self, run: messages.RunSettings, count: int) -> None:
-        if self._recording is not None:
+        if self._arming is not None:
+            self._send_idle(message("A run is being armed already: wait until its disk answers"))
+        elif self._recording is not None:
             self._recording.show_note(message("A run is being recorded already: stop it before the next one"))
         elif self._stream.is_disconnected:
             self._refuse(
                 messages.EndReason.DEVICE_LOST,
                 message("the device is away: plug it in, and record when it is back"),
             )
-        elif self._try_to_arm(run):
+        else:
             self._sequence.begin(run, count)
-
-    def _try_to_arm(self, run: messages.RunSettings) -> bool:
-        try:
             self._arm(run)
+
+    def _follow_arming(self) -> None:
+        """Begin the run whose journal is there, or refuse it where its disk gives no answer."""
+        arming = self._arming
+        if arming is None:
+            return
+        try:
+            prepared = arming.poll(_ARMING_S)
         except DiskSpaceError as error:
+            self._arming = None
             self._refuse(messages.EndReason.DISK_FULL, message_of(error))
         except JournalError as error:
+            self._arming = None
             self._refuse(end_reason(error), message_of(error))
-        return self._recording is not None
+        else:
+            if prepared is not None:
+                self._arming = None
+                self._start_recording(arming, *prepared)
 
     def _refuse(self, reason: messages.EndReason, message: Message) -> None:
         _log.warning("run refused (%s): %s", reason, message)
         self._sequence.stop()
+        self._sleep_prevention.end()
         self._events.send(messages.RunEnded("", reason, 0, 0, 0, 0, 0, self._rate_hz, message=message))
         self._send_idle()
 
     def _arm(self, run: messages.RunSettings) -> None:
+        """Arm a run; its disk is asked in a thread, which is waited for as long as nobody notices."""
         run_setup.check_run_settings(run)
-        folder = Path(run.directory).absolute()
-        demand = self._disk_demand()
-        note = check_disk_space(folder, run, demand)
         metadata = run_setup.build_metadata(
             run, self._stand, self._gauges, self._stream, simulated=self.is_simulated
         )
         self._history.span = round(max(_HISTORY_S, run.pretrigger_s + _AFTER_PRETRIGGER_S) * self._rate_hz)
-        journal = run_setup.create_run_journal(self._port, run, metadata)
-        self._disk.begin(folder, demand)
+        folder, demand = Path(run.directory).absolute(), self._disk_demand()
+
+        def prepare() -> tuple[Journal, Message]:
+            note = check_disk_space(folder, run, demand)
+            journal = run_setup.create_run_journal(self._port, run, metadata)
+            self._disk.begin(folder, demand)
+            return journal, note
+
+        self._arming = Arming(run, metadata, prepare)
+        self._arming.wait(_ARMING_WAIT_S)
+        self._follow_arming()
+
+    def _start_recording(self, arming: Arming, journal: Journal, note: Message) -> None:
+        run, metadata = arming.run, arming.metadata
         if self._writer.failure is not None:
             self._writer.abandon()
             self._writer = WriterClient.start()
@@ -258,6 +294,10 @@ class Engine:
     def _end_all(self, reason: messages.EndReason, message: Message = EMPTY) -> None:
         """End the run and keep it; one that is stopped, or armed itself, and only waits leaves nothing."""
         self._sequence.stop()
+        if self._arming is not None:
+            self._arming.abandon()
+            self._arming = None
+            self._refuse(reason, message)
         if self._recording is not None:
             keep_rest = not (self._sequence.is_repeat or reason in _ENDED_BY_OPERATOR)
             self._recording.end(reason, message, keep_rest=keep_rest)
@@ -266,7 +306,7 @@ class Engine:
         """The owner is gone: continue only a run that comes to its end by itself."""
         self._is_quitting = True
         self._sequence.stop()
-        if self._recording is not None and not self._recording.is_unattended:
+        if self._arming is not None or (self._recording and not self._recording.is_unattended):
             self._end_all(messages.EndReason.INTERRUPTED, message("the program that recorded ended"))
 
     def _follow_recording(self) -> None:
@@ -286,8 +326,10 @@ class Engine:
         self._recording = None
         ended, following = self._sequence.next_after(ended)
         self._events.send(ended)
-        if following is None or not self._try_to_arm(following):
+        if following is None:
             self._sleep_prevention.end()
+        else:
+            self._arm(following)
         if self._commands.is_closed and not self._is_asked_to_quit:
             self._leave_note(recording, ended)
         if following is None:
@@ -310,6 +352,8 @@ class Engine:
 
     def _finish(self, reason: messages.EndReason, message: Message) -> None:
         self._sequence.stop()
+        if self._arming is not None:
+            self._arming.abandon()
         if self._recording is not None:
             self._recording.end(reason, message)
         while self._recording is not None:

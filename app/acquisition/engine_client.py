@@ -50,7 +50,7 @@ class EngineClient:
         low_latency: bool = False,
         directory: str = "",
     ) -> Self:
-        """Start an engine and connect it; new rows come within 20 ms with `low_latency`, else 0.14 s.
+        """Start an engine and connect it; new rows come within 20 ms with `low_latency`, else 0.9 s.
 
         `directory` is the folder of the runs to come.
         """

@@ -1,6 +1,8 @@
 """One run from arming to its end. The trigger decides when it begins and ends; here it is carried out."""
 
 import contextlib
+import math
+import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum, auto
@@ -25,9 +27,13 @@ from app.runs.metadata import EndMetadata, RunMetadata
 from app.runs.writer_client import OpenRun, WriterClient
 from drivers.clock import TimeBase
 from drivers.samples import Losses
+from messages.i18n import N_
 from messages.message import EMPTY, Message, message, message_of
 
 _NOTES_MAX = 100  # of a run: a cable that is loose for hours gives a new note each time
+_STALL_TOLD_S = 1.0  # the operator is told of a disk that takes nothing for so long
+_HANGS_S = 4.0  # and the run ends after so long
+_DISCARD_S = 0.5  # longest that the removal of a journal without a run is waited for
 _FOLLOW_S = 0.07
 """How often a run is followed that may wait: what is done for so many samples at once costs less."""
 
@@ -35,7 +41,8 @@ _FOLLOW_S = 0.07
 class Latency(Enum):
     """How soon new samples must be processed."""
 
-    BATCHED = auto()  # nobody at the stand waits for it
+    BATCHED = auto()  # nobody waits for it
+    IDENTIFIED = auto()  # the live identification follows the motion; nobody at the stand waits
     INTERACTIVE = auto()  # it may call for the operator's next step
     IMMEDIATE = auto()  # the table is held and may be released, which must be reported at once
 
@@ -88,6 +95,7 @@ class Recording:
         )
         self._note = EMPTY
         self._is_at_rest = True  # as reported last
+        self._is_stall_told = False
         self._open_tap()
         self._update_checkpoint()
         self._send_state(self._state, self._armed_index, self._trigger.note)
@@ -107,8 +115,15 @@ class Recording:
     def latency(self) -> Latency:
         if self._trigger.awaits_release:
             return Latency.IMMEDIATE
-        is_free = self.is_unattended or self._settings.trigger == "none"
-        return Latency.BATCHED if is_free else Latency.INTERACTIVE
+        if self.confirmed_start_index is not None:
+            return Latency.IDENTIFIED
+        return Latency.BATCHED if self._settings.trigger == "none" else Latency.INTERACTIVE
+
+    @property
+    def ends_s(self) -> float:
+        """Time until the samples of the run are complete; infinite where only a motion ends it."""
+        end = self._trigger.end
+        return math.inf if end is None else (end[0] - self._history.next_index) / self._rate_hz
 
     @property
     def confirmed_start_index(self) -> int | None:
@@ -135,7 +150,7 @@ class Recording:
             return
         self._pending += reads
         new = self._history.next_index - self._followed_index
-        if self.latency is not Latency.BATCHED or new >= _FOLLOW_S * self._rate_hz:
+        if self.latency not in (Latency.BATCHED, Latency.IDENTIFIED) or new >= _FOLLOW_S * self._rate_hz:
             self._follow_pending()
 
     def end(self, reason: messages.EndReason, message: Message = EMPTY, *, keep_rest: bool = True) -> None:
@@ -155,9 +170,9 @@ class Recording:
         except RunError as error:
             self._store_note(message_of(error))
         if self._file is None:  # there is nothing to keep
-            with contextlib.suppress(JournalError):
-                self._journal.close()
-            self._journal.remove()
+            discarding = threading.Thread(target=self._discard_journal, name="closing", daemon=True)
+            discarding.start()
+            discarding.join(_DISCARD_S)
         else:
             self._send_state(messages.PullbackState.CLOSING, self._file.next_index)
             self._file.close(self._ending(self._file))
@@ -176,6 +191,7 @@ class Recording:
 
     def poll(self) -> messages.RunEnded | None:
         """Report what has happened to journal and file; return the run's end once its file is safe."""
+        self._follow_disk()
         moved = self._journal.move_message
         if moved and moved not in self._notes:
             self._store_note(moved)
@@ -193,6 +209,26 @@ class Recording:
         self._ended = result.fault or self._ended
         self._store_note(result.message, first=True)
         return self._run_ended(result.path, file.statistics.losses())
+
+    def _discard_journal(self) -> None:
+        with contextlib.suppress(JournalError):
+            self._journal.close()
+        self._journal.remove()
+
+    def _follow_disk(self) -> None:
+        """Tell of a disk that takes nothing, and end the run where it does not come back soon."""
+        stalled_s = self._journal.stalled_s
+        if stalled_s < _STALL_TOLD_S or self._journal.left is not None:
+            self._is_stall_told = False
+            return
+        if not self._is_stall_told:
+            self._is_stall_told = True
+            template = N_("the disk of {folder} takes nothing any more: check the disk, or its network")
+            self.show_note(message(template, folder=self.directory))
+        if stalled_s > _HANGS_S and not self.is_ending and self._journal.leave_hanging_disk():
+            template = N_("the disk of {folder} has taken nothing for {stalled_s:.0f} s")
+            hangs = message(template, folder=self.directory, stalled_s=stalled_s)
+            self.end(messages.EndReason.WRITE_ERROR, hangs)
 
     def _send_path(self, file: RunFile) -> None:
         error = file.path.exception()

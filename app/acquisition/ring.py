@@ -10,7 +10,9 @@ when any process that looked at it ends.
 
 import contextlib
 import mmap
+import os
 import shutil
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -164,6 +166,8 @@ def create_ring(path: Path, capacity: int, rate_hz: float, gauges: Gauges) -> Ri
     size = _columns_start(8 * _WORDS + len(settings)) + _ROW_BYTES * capacity
     try:
         with path.open("x+b") as file:
+            if sys.platform == "linux":  # a page of a mapped file that finds no room ends the process
+                os.posix_fallocate(file.fileno(), 0, size)
             file.truncate(size)
             mapped = mmap.mmap(file.fileno(), size)
     except OSError as error:
@@ -192,6 +196,9 @@ def _columns_start(settings_end: int) -> int:
     return -(-settings_end // _PAGE_BYTES) * _PAGE_BYTES
 
 
+MEMORY_FOLDER = Path("/dev/shm")
+"""Files in memory on Linux. A mapped page of a disk may wait for the disk, and all threads with it."""
+_MEMORY_BYTES = 1 << 26  # free there: more than the largest ring needs
 _PREFIX = "slipstand-live-"
 _LOCK = "engine.lock"
 _SETTLED_S = 60.0  # a younger folder may belong to an engine that has not locked it yet
@@ -200,13 +207,24 @@ _SETTLED_S = 60.0  # a younger folder may belong to an engine that has not locke
 @contextlib.contextmanager
 def live_folder() -> Iterator[Path]:
     """Make a folder for this user alone, and remove those of engines that were killed."""
-    _remove_abandoned(Path(tempfile.gettempdir()))
-    folder = Path(tempfile.mkdtemp(prefix=_PREFIX))
+    parent = _live_parent()
+    for searched in {parent, Path(tempfile.gettempdir())}:
+        _remove_abandoned(searched)
+    folder = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=parent))
     try:
         with FileLock(folder / _LOCK):
             yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)  # Windows keeps a mapped file; the client removes it
+
+
+def _live_parent() -> Path:
+    """Folder in memory where the system has one with room, else that of temporary files."""
+    with contextlib.suppress(OSError):
+        is_writable = os.access(MEMORY_FOLDER, os.W_OK | os.X_OK)
+        if is_writable and shutil.disk_usage(MEMORY_FOLDER).free >= _MEMORY_BYTES:
+            return MEMORY_FOLDER
+    return Path(tempfile.gettempdir())
 
 
 def _remove_abandoned(parent: Path) -> None:

@@ -85,6 +85,7 @@ class UncommittedRows:
 
 _BATCH_S = 0.05  # rows are passed to the writer in batches: block by block costs several times as much
 _CLOSING_S = 120.0
+_HANGING_S = 3.0  # for a writer whose disk is known to hang
 _SLOW_BYTES_PER_S = 5e6  # and so much longer for what the writer copies and reads again, on a slow disk
 
 
@@ -193,7 +194,7 @@ class RunFile:
             notes.append(message("{samples} samples are only in the journal", samples=missing))
         elif first is None and (stored is None or not stored.raw_bytes_stored):
             notes.append(message("no room for the received bytes in the run"))
-        if not notes:
+        if not notes and self._journal.left is None:
             self._journal.remove()
         elif missing or journal_fault is None:
             notes.append(self._remedy(journal_fault))
@@ -208,13 +209,37 @@ class RunFile:
     def _stored(self, ending: EndMetadata) -> StoredRun:
         size = self.statistics.losses().samples * ROW_BYTES + self._journal.size
         timeout_s = _CLOSING_S + size / _SLOW_BYTES_PER_S
+        if self._journal.left is not None:
+            timeout_s = _HANGING_S
         try:
             return self._writer.close(ending).result(timeout_s)
         except FutureTimeoutError:
             template = N_("the run writer gives no answer for {timeout_s:.0f} s")
-            raise WriteError(template, timeout_s=timeout_s) from None
+            error = WriteError(template, timeout_s=timeout_s)
+            self._writer.give_up(error)
+            if (stored := self._finished_run()) is not None:
+                return stored
+            raise error from None
+
+    def _finished_run(self) -> StoredRun | None:
+        """What a writer that gives no answer has finished; None where it has not, or its disk hangs too."""
+        from app.runs.file_operations import inspect_run  # loads HDF5, which an engine does without
+
+        path, samples = self._known_path(), self.statistics.losses().samples
+        if not path or self._journal.left is not None:
+            return None
+        run = inspect_run(Path(path))
+        is_finished = run is not None and run.end is not None and run.samples == samples
+        return StoredRun(path, samples, run.raw_bytes_stored) if run and is_finished else None
 
     def _remedy(self, journal_fault: Exception | None) -> Message:
+        left = self._journal.left
+        if left is not None:
+            template = N_(
+                "When the disk is back, rebuild the run with slipstand recover {folder}, and what came later"
+                " with slipstand recover {other}"
+            )
+            return message(template, folder=left.parent, other=self._journal.path.parent)
         template = N_("All that came is in {journal}: rebuild the run with slipstand recover {folder}")
         if journal_fault is not None:
             template = N_(

@@ -10,6 +10,7 @@ from app.cli.commands import app
 from app.cli.errors import error_text, is_expected
 from app.interrupts import was_interrupted
 from app.log import start_log
+from messages.control_characters import show_control_characters
 
 _log = logging.getLogger(__name__)
 
@@ -36,7 +37,7 @@ def run() -> None:
         _log.log(logging.INFO if is_expected(error) else logging.ERROR, "failed", exc_info=True)
         if os.environ.get("SLIPSTAND_DEBUG"):
             raise
-        sys.stderr.write(f"error: {error_text(error)}\n")
+        sys.stderr.write(f"error: {show_control_characters(error_text(error))}\n")
         sys.exit(1)
 
 

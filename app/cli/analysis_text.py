@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from typing import Any, Final
 
-from analysis.catalogue import ACCELERATION, CATALOGUE, METRES_PER_SECOND, Place, definition
+from analysis.catalogue import CATALOGUE, Place, definition
 from analysis.formatting import format_value
 from analysis.motion.two_mass import PEAK_RATES
 from analysis.verdict_text import EFFECT_TITLES, describe_verdict
@@ -152,11 +152,3 @@ def budget_shares(budget: list[dict[str, Any]]) -> list[str]:
     stated = sorted(((share, source) for source, share in shares.items() if share), reverse=True)
     parts = [f"{source} {share:.2g}" for share, source in stated if share > _SHOWN * stated[0][0]]
     return parts + [source for source, share in shares.items() if share is None]
-
-
-def largest_rates(document: dict[str, Any], decimals: int) -> Iterator[tuple[str, str]]:
-    """Largest velocity, to so many decimals, and acceleration, to one less, of table and plate."""
-    for body in _BODIES:
-        velocity = METRES_PER_SECOND.text(document[f"{body}_velocity_max_m_per_s"], decimals)
-        acceleration = ACCELERATION.text(document[f"{body}_acceleration_max_m_per_s2"], decimals - 1)
-        yield f"{body} at most", f"{velocity}, {acceleration}"

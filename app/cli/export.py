@@ -1,6 +1,5 @@
 """`slipstand export`: runs and their coefficients for other programs."""
 
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -35,7 +34,7 @@ def export(options: ExportOptions) -> None:
             outcomes = export_runs(runs, target, request, progress=update)
         _report(outcomes, listed=output is not None, as_json=options.as_json)
         if output is None and shown.exists():
-            sys.stdout.write(shown.read_text("utf-8"))
+            out.print_document(shown.read_text("utf-8"), is_json=name == "json")
     if any(outcome.error for outcome in outcomes):
         raise typer.Exit(1)
 

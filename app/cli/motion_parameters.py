@@ -1,7 +1,10 @@
-"""Parameters of a motion, as `simulate` and `plan` take them from their options and a series."""
+"""A motion as `simulate` and `plan` take it from options and a series, and show it."""
 
 import dataclasses
+from collections.abc import Iterator
+from typing import Any
 
+from analysis.catalogue import ACCELERATION, METRES_PER_SECOND
 from analysis.motion.two_mass import TwoMassParameters
 from app.cli.errors import CommandError
 from app.cli.measurement_options import MotionOptions
@@ -50,3 +53,11 @@ def _check_pullback(pullback_m: float | None) -> None:
             f"--pullback {pullback_m:g} m is farther than stands are pulled back. Give metres,"
             f" {-PULLBACK_MAX_M:g} to {PULLBACK_MAX_M:g}"
         )
+
+
+def largest_rates(document: dict[str, Any], decimals: int) -> Iterator[tuple[str, str]]:
+    """Largest velocity, to so many decimals, and acceleration, to one less, of table and plate."""
+    for body in ("table", "plate"):
+        velocity = METRES_PER_SECOND.text(document[f"{body}_velocity_max_m_per_s"], decimals)
+        acceleration = ACCELERATION.text(document[f"{body}_acceleration_max_m_per_s2"], decimals - 1)
+        yield f"{body} at most", f"{velocity}, {acceleration}"

@@ -9,12 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from app.cli.errors import CommandError, alternatives
+from messages.control_characters import json_escapes, show_control_characters
 from messages.message import Message
 
 
 def print_json(document: object) -> None:
     """Write one JSON document to stdout. Numbers that are not finite are a fault, not `NaN`."""
-    sys.stdout.write(json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
+    sys.stdout.write(json_escapes(text) + "\n")
     sys.stdout.flush()
 
 
@@ -29,7 +31,7 @@ def print_json_list() -> Iterator[Callable[[object], None]]:
     def add(element: object) -> None:
         nonlocal count
         text = json.dumps(element, indent=2, ensure_ascii=False, allow_nan=False)
-        sys.stdout.write(("," if count else "[") + "\n" + textwrap.indent(text, "  "))
+        sys.stdout.write(("," if count else "[") + "\n" + textwrap.indent(json_escapes(text), "  "))
         count += 1
 
     try:
@@ -40,14 +42,19 @@ def print_json_list() -> Iterator[Callable[[object], None]]:
             sys.stdout.flush()
 
 
+def print_document(text: str, *, is_json: bool) -> None:
+    """Write a document to stdout; no character of it steers a terminal."""
+    sys.stdout.write(json_escapes(text) if is_json else show_control_characters(text))
+
+
 def print_line(text: str) -> None:
-    """Write a line for people to stdout."""
-    sys.stdout.write(text + "\n")
+    """Write a line for people to stdout; no character of it steers the terminal."""
+    sys.stdout.write(show_control_characters(text) + "\n")
 
 
 def print_status(text: str) -> None:
-    """Write a line about the work itself to stderr."""
-    sys.stderr.write(text + "\n")
+    """Write a line about the work itself to stderr; no character of it steers the terminal."""
+    sys.stderr.write(show_control_characters(text) + "\n")
 
 
 def print_fields(rows: Iterable[tuple[str, object]], width: int) -> None:
@@ -84,7 +91,7 @@ def progress_bar(description: str, total: float | None = None) -> Iterator[Any]:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
     console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn())
     with Progress(
         *columns,
         console=console,
@@ -92,9 +99,13 @@ def progress_bar(description: str, total: float | None = None) -> Iterator[Any]:
         redirect_stdout=sys.stdout.isatty(),  # else what goes to a file would come out on stderr
         disable=not console.is_terminal,
     ) as bar:
-        task = bar.add_task(description, total=total)
+        task = bar.add_task(show_control_characters(description), total=total)
 
         def update(completed: float, text: str | Message | None = None) -> None:
-            bar.update(task, completed=completed, description=None if text is None else str(text))
+            bar.update(
+                task,
+                completed=completed,
+                description=None if text is None else show_control_characters(str(text)),
+            )
 
         yield update

@@ -6,9 +6,9 @@ from typing import Any
 from analysis.catalogue import MILLIMETRE, definition
 from analysis.formatting import format_uncertainty, format_value
 from app.cli import output as out
-from app.cli.analysis_text import budget_shares, largest_rates
+from app.cli.analysis_text import budget_shares
 from app.cli.measurement_options import PlanOptions
-from app.cli.motion_parameters import check_samples, motion_parameters
+from app.cli.motion_parameters import check_samples, largest_rates, motion_parameters
 from app.runs.campaign.last_runs import LastRuns, read_last_runs
 from app.runs.listing import check_folder_exists
 from app.runs.paths import recordings_directory

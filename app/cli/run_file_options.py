@@ -235,5 +235,8 @@ class DoctorOptions:
         "Write findings, versions, ports, settings and log to one file for a bug report.",
         metavar="FILE.zip",
     )
+    compile_code: bool = flag(
+        "--compile", "Compile all numerical code first, once after an installation: no test waits for it."
+    )
     force: bool = shared.force()
     as_json: bool = shared.as_json()

@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 
 from analysis.catalogue import MILLIMETRE, Place, definition
-from analysis.motion.paper_method import simulate as simulate_by_paper
 from analysis.motion.two_mass import PEAK_RATES, Motion, TwoMassParameters
 from app.cli import output as out
-from app.cli.analysis_text import largest_rates
 from app.cli.errors import CommandError
 from app.cli.measurement_options import SimulateOptions
-from app.cli.motion_parameters import check_samples, motion_parameters
+from app.cli.motion_parameters import check_samples, largest_rates, motion_parameters
 from app.cli.option_values import key_values
 from app.runs.disk import atomic_write
-from app.runs.simulated import write_simulated_run
 from app.simulated_stand.effects import GAUGE_EFFECTS, gauge_values, motion_values, parse_effects
 from app.simulated_stand.gauge_chain import GaugeChain
 from app.simulated_stand.motion import simulate_stand
@@ -37,12 +34,16 @@ def simulate(options: SimulateOptions) -> None:
         if effects:
             raise CommandError("--effect needs --method exact: the paper knows the ideal stand only")
         _check_step(options.step, parameters)
+        from analysis.motion.paper_method import simulate as simulate_by_paper
+
         motion: Motion = simulate_by_paper(parameters, duration_s=options.duration, step_s=options.step)
     else:
         motion = simulate_stand(parameters, motion_values(effects), options.duration)
     if target is not None and target.suffix.lower() == ".csv":
         _write_csv(target, motion, options.rate, replace=options.force)
     elif target is not None:
+        from app.runs.simulated import write_simulated_run  # and with it what reads and writes run files
+
         values = motion_values(effects), gauge_values(effects)
         chain = GaugeChain(values[1], parameters.pullback_m, options.rate)
         write_simulated_run(

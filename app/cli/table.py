@@ -1,7 +1,6 @@
 """`slipstand table`: the paper's Table 1 from runs, with uncertainties and repeats."""
 
 import shutil
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,7 +34,8 @@ def table(options: TableOptions) -> None:
         out.print_line(str(target))
     else:
         width = max(shutil.get_terminal_size((_UNLIMITED, 0)).columns, _WIDTH_MIN)
-        sys.stdout.write(as_text(content, name, width, with_repeats=options.repeats))
+        text = as_text(content, name, width, with_repeats=options.repeats)
+        out.print_document(text, is_json=name == "json")
     if target or name in ("csv", "latex"):  # which do not show the notes; failures are printed at the end
         for title, sentences in note_sections(replace(content, failures=())):
             for sentence in sentences:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QLibraryInfo, QLocale, QTimer, QTranslator
+from PySide6.QtCore import QLibraryInfo, QLocale, Qt, QTimer, QTranslator
 from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication, QMessageBox
 
@@ -53,7 +53,9 @@ def run_window(simulated: bool = False, series: str = "1FFM0", run: str = "") ->
     try:
         presenter = make_window_presenter(personal=personal, errors=errors)
     except ConfigError as error:
-        QMessageBox.critical(None, "Slipstand", str(error))
+        box = QMessageBox(QMessageBox.Icon.Critical, "Slipstand", str(error))
+        box.setTextFormat(Qt.TextFormat.PlainText)
+        box.exec()
         return _refuse(str(error))
     window = MainWindow(theme, presenter, _load_layout(errors))
     window.closed.connect(lambda layout: _save_layout(layout, errors))

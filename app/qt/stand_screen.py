@@ -9,7 +9,7 @@ from app.qt.theme import TextRole, set_property
 from app.qt.widgets.inputs import ComboBox, make_button, show_default, show_texts
 from app.qt.widgets.layouts import STRETCH, Item, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import ValueGrid, label, plain_text, set_text_or_hide, show_chip
+from app.qt.widgets.text import ValueGrid, label, plain_text, set_text_or_hide, set_tool_tip, show_chip
 from app.simulated_stand.effects import LISTED
 from app.simulated_stand.options import Gesture
 from messages.i18n import N_, gettext
@@ -101,7 +101,7 @@ class StandScreen(QWidget):
         for line, (name, field) in enumerate(self._fields.items(), start=1):
             _add(grid, line, gettext(_FIELDS[name][0]), field, gettext(_FIELDS[name][1]))
         effects = self._fields["effects"]
-        effects.setToolTip("\n".join((effects.toolTip(), *LISTED)))
+        set_tool_tip(effects, "\n".join((effects.toolTip(), *LISTED)))
         hint = gettext("Empty a field for its usual value.")
         return _card(gettext("Set up the simulated stand"), hint, grid, self._start, self._message)
 
@@ -134,7 +134,7 @@ def _add(grid: QGridLayout, line: int, name: str, field: QWidget, hint: str) -> 
     title = label(name)
     title.setBuddy(field)
     field.setAccessibleName(plain_text(name))
-    field.setToolTip(hint)
+    set_tool_tip(field, hint)
     grid.addWidget(title, line, 0)
     grid.addWidget(field, line, 1)
     grid.setColumnStretch(1, 1)

@@ -24,7 +24,16 @@ from app.qt.widgets.layouts import (
     make_scroll_area,
 )
 from app.qt.widgets.shortcuts import ENTER_KEYS, add_shortcut, bind_button
-from app.qt.widgets.text import break_path, label, padded, set_text_or_hide, show_chip
+from app.qt.widgets.text import (
+    break_path,
+    button_text,
+    label,
+    padded,
+    set_text_or_hide,
+    set_tool_tip,
+    show_chip,
+    tool_tip,
+)
 from messages.i18n import N_, gettext
 
 _CARD_WIDTHS, _CARD_HEIGHT = (256, 296), 344
@@ -68,7 +77,7 @@ class StartScreen(QWidget):
             (self._disconnect, "Alt+D", gettext("Let go of the device")),
         ):
             bind_button(button, keys, words, self)
-        self._open.setToolTip(gettext("Open a recording") + " (Ctrl+O)")
+        set_tool_tip(self._open, gettext("Open a recording") + " (Ctrl+O)")
         add_shortcut(self, ENTER_KEYS, "", self._press_primary)
 
     def show_state(self, state: StartState) -> None:
@@ -161,9 +170,10 @@ class _RecentRuns(QWidget):
         self.setVisible(bool(paths))
         for button, path in zip(self._buttons, padded(paths, RUNS_MAX, ""), strict=True):
             name, metrics = Path(path).stem, button.fontMetrics()
-            button.setText(metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, _NAME_WIDTH))
+            elided = metrics.elidedText(name, Qt.TextElideMode.ElideMiddle, _NAME_WIDTH)
+            button.setText(button_text(elided))
             button.setAccessibleName(gettext("Open {name}", name=name))
-            button.setToolTip(path)
+            set_tool_tip(button, path)
             button.setVisible(bool(path))
 
     def _open(self, number: int) -> None:
@@ -257,7 +267,7 @@ class _Form(QWidget):
         )
         self._fields["relative_port"].setAccessibleName(gettext("Port of gauge 2"))
         hint = gettext("Port of gauge 2, where each gauge has a device and a port of its own")
-        self._fields["relative_port"].setToolTip(hint)
+        set_tool_tip(self._fields["relative_port"], hint)
         rare.setContentsMargins(0, 0, 0, 0)
         self._rare.setLayout(rare)
         self._rare.hide()
@@ -279,7 +289,7 @@ def _refill(box: QComboBox, items: list[tuple[str, str]]) -> None:
     box.clear()
     for index, (text, hint) in enumerate(items):
         box.addItem(text)
-        box.setItemData(index, hint, Qt.ItemDataRole.ToolTipRole)
+        box.setItemData(index, tool_tip(hint), Qt.ItemDataRole.ToolTipRole)
 
 
 def _card(title: str, hint: str, *parts: Item) -> QFrame:

@@ -6,9 +6,8 @@ exists before the first sample, and values that are known at the end only are fi
 """
 
 import contextlib
+import dataclasses
 import datetime
-import os
-import secrets
 import tempfile
 from pathlib import Path
 from typing import Literal
@@ -18,7 +17,15 @@ import numpy as np
 
 from app.runs import schema
 from app.runs.blocks import BlockLayout
-from app.runs.disk import MARGIN_BYTES, check_free_space, reserve_space, storage_error
+from app.runs.disk import (
+    MARGIN_BYTES,
+    UNFINISHED_SUFFIX,
+    check_free_space,
+    reserve_space,
+    storage_error,
+    sync_file,
+    unfinished_name,
+)
 from app.runs.errors import RunError
 from app.runs.fields import make_group, reserve_fields
 from app.runs.lock import RECORDING_SUFFIX, FileLock, LockHeldError, is_held, recording_lock
@@ -26,8 +33,7 @@ from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import write_metadata
 from app.runs.schema import Column
 from app.version import __version__
-
-UNFINISHED_SUFFIX = ".making"  # ends the temporary name of a run file. A killed process may leave one.
+from config.durable_files import give_new_name
 
 _CHECK_ROWS = 1000
 _PAGE_BYTES = 4096
@@ -41,20 +47,26 @@ _CHUNKS_CACHED_BYTES = 1 << 19
 _METADATA_CACHED_BYTES = 1 << 16  # of the whole file. HDF5 would keep every index node as the file grows.
 
 
-def create_file(path: Path, metadata: RunMetadata, layout: BlockLayout, identifier: str = "") -> h5py.File:
-    """Create a run file and leave it open. Raises RunError, OSError and RuntimeError of HDF5."""
+def create_file(
+    path: Path, metadata: RunMetadata, layout: BlockLayout, identifier: str = "", *, has_wire: bool = True
+) -> h5py.File:
+    """Create a run file and leave it open. Raises RunError, OSError and RuntimeError of HDF5.
+
+    `has_wire`: the bytes of a device are stored at its end.
+    """
     if path.exists():
         raise FileExistsError(str(path))
     check_free_space(path.parent, MARGIN_BYTES)
-    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}{UNFINISHED_SUFFIX}")
+    temporary = unfinished_name(path)
     try:
         with _open(temporary, "x") as file:
-            create_template(file, path.name, metadata, layout, identifier)
+            create_template(file, path.name, metadata, layout, identifier, has_wire=has_wire)
             # What HDF5 has not written yet is a hole in the file, which needs room later.
             reserve_space(temporary, 0, file.id.get_filesize() + MARGIN_BYTES)
             wire = [column.path for column in schema.WIRE_COLUMNS]
             _create_chunk_indices(file, [*column_paths(metadata, layout), *wire])
-        _give_name(temporary, path)
+        sync_file(temporary)
+        give_new_name(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
     try:
@@ -71,7 +83,13 @@ def column_paths(metadata: RunMetadata, layout: BlockLayout) -> list[str]:
 
 
 def create_template(
-    file: h5py.File, name: str, metadata: RunMetadata, layout: BlockLayout, identifier: str = ""
+    file: h5py.File,
+    name: str,
+    metadata: RunMetadata,
+    layout: BlockLayout,
+    identifier: str = "",
+    *,
+    has_wire: bool = True,
 ) -> None:
     """Create everything but the rows, in a new file whose final name is `name`. Raises MetadataError."""
     file.attrs.update(
@@ -94,11 +112,13 @@ def create_template(
     write_metadata(file, metadata, identifier)
     _create_motion(file, metadata, layout)
     if layout.counts:
-        attributes = {"units": "count", "long_name": "readings as received"}
+        attributes = {"units": "count", "long_name": "readings as received (count)"}
         for gauge in range(layout.channels):
             _create_column(file, Column(schema.count_path(gauge), "", layout.counts, attributes))
     for column in schema.WIRE_COLUMNS:
-        _create_column(file, column)
+        # rhdf5 of R fails on a column of 64-bit integers in which there is none.
+        dtype = "int32" if column.dtype.endswith("64") and not has_wire else column.dtype
+        _create_column(file, dataclasses.replace(column, dtype=dtype))
     reserve_fields(file, schema.END_FIELDS)
     file.create_dataset(schema.STORED, data=0, dtype="uint64")
     for path in column_paths(metadata, layout):
@@ -159,7 +179,7 @@ def _create_motion(file: h5py.File, metadata: RunMetadata, layout: BlockLayout) 
     signals = _signals(metadata, layout)
     leaves = [path.rpartition("/")[2] for path in signals]
     for path, leaf in zip(signals, leaves, strict=True):
-        named = {**attributes, "long_name": leaf.replace("_", " ")}
+        named = {**attributes, "long_name": f"{leaf.replace('_', ' ')} ({metadata.unit})"}
         _create_column(file, Column(path, "", "float64", named, fill=float("nan")))
     _create_column(file, schema.STATUS_COLUMN)
     for path in [*signals, schema.STATUS]:
@@ -192,18 +212,6 @@ def _create_chunk_indices(file: h5py.File, growing: list[str]) -> None:
             file[path].resize((rows,))
             file[path][:] = 0
         file.flush()
-
-
-def _give_name(temporary: Path, path: Path) -> None:
-    """Give a file its final name in one step. Raises FileExistsError where something has it."""
-    try:
-        os.link(temporary, path)
-    except FileExistsError:
-        raise
-    except OSError:  # a file system without links
-        if path.exists():
-            raise FileExistsError(str(path)) from None
-        temporary.rename(path)
 
 
 def _open_for_rows(path: Path) -> h5py.File:

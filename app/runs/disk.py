@@ -14,8 +14,20 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
-from config.durable_files import file_in_use, is_in_use, remove_file, replace_file, sync_descriptor
+from config.durable_files import (
+    file_in_use,
+    give_new_name,
+    is_in_use,
+    make_folders,
+    remove_file,
+    replace_file,
+    sync_descriptor,
+    sync_folder,
+)
 from messages.i18n import N_
+
+UNFINISHED_SUFFIX = ".making"
+"""Ends the names of unfinished runs and journals. `remove_abandoned` removes those of dead processes."""
 
 MARGIN_BYTES = 1 << 20
 """Claimed beyond the next need of a run, so that its file can still be closed in good order."""
@@ -24,7 +36,6 @@ _NO_SPACE = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 """No space on the disk, in the quota, or within the largest size of a file."""
 LONGEST_PATH = 239 if sys.platform == "win32" else None
 """Windows takes 259 characters unless it is set up otherwise; names of unfinished files are 20 longer."""
-_CANNOT_SYNC = (errno.EINVAL, errno.ENOTSUP, errno.ENOSYS, errno.EACCES, errno.EPERM)
 
 
 def reserve_space(path: Path, size: int, more: int) -> None:
@@ -35,7 +46,9 @@ def reserve_space(path: Path, size: int, more: int) -> None:
     """
     try:
         if sys.platform == "linux":
-            handle = os.open(path, os.O_WRONLY)
+            handle = os.open(
+                path, os.O_RDWR
+            )  # as read by the C library where the file system reserves nothing
             try:
                 os.posix_fallocate(handle, size, more)
             finally:
@@ -112,7 +125,7 @@ def is_writable(folder: Path) -> bool:
 def make_folder(folder: Path) -> None:
     """Make a folder with its parents; one that exists stays. Raises DiskFullError, WriteError."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make_folders(folder)
     except FileExistsError:
         raise WriteError(
             "{folder} is a file and cannot be written into. Choose a folder", folder=folder
@@ -127,24 +140,14 @@ def sync_file(path: Path) -> None:
         sync_descriptor(file.fileno())
 
 
-def sync_folder(folder: Path) -> None:
-    """Bring new names in a folder to disk, where system, network share and rights allow it."""
-    if sys.platform == "win32":
-        return
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            sync_descriptor(handle)
-        finally:
-            os.close(handle)
-    except OSError as error:
-        if error.errno not in _CANNOT_SYNC:
-            raise
-
-
 _LEFT_S = 600.0  # no copy of a run takes so long; younger ones may still be written
 _TEMPORARY = re.compile(r"\..+\.(\d+\.tmp|[0-9a-f]{8}\.\w+)")
 """Names of `temporary_copy` and of `atomic_write`."""
+
+
+def unfinished_name(path: Path) -> Path:
+    """Path beside a file for its contents until they are on disk, when they get its name."""
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex[:8]}{UNFINISHED_SUFFIX}")
 
 
 def temporary_copy(path: Path) -> Path:
@@ -167,19 +170,17 @@ def leftover_files(folder: Path) -> list[Path]:
 def atomic_write(path: Path, *, replace: bool = False) -> Iterator[Path]:
     """Yield a temporary path; its file becomes `path` in the end. Raises RunExistsError, WriteError."""
     temporary = path.with_name(f".{path.stem}.{uuid.uuid4().hex[:8]}{path.suffix}")
-    claimed = False
     try:
-        if not replace:
-            path.open("x").close()  # nobody else can take the name meanwhile
-            claimed = True
+        if not replace and os.path.lexists(path):
+            raise FileExistsError(str(path))
         yield temporary
         sync_file(temporary)
-        replace_file(temporary, path)
-        claimed = False
+        if replace:
+            replace_file(temporary, path)
+        else:
+            give_new_name(temporary, path)
         sync_folder(path.parent)
     except OSError as error:
         raise storage_error(path, error) from None
     finally:
         remove_file(temporary)
-        if claimed:
-            remove_file(path)

@@ -49,8 +49,7 @@ def reserve_fields(file: h5py.File, fields: Sequence[Field]) -> None:
     """Make room for fields that are known at the end only. Objects made late can be lost by a crash."""
     for field in fields:
         if field.reserved_bytes:
-            dtype = h5py.string_dtype("utf-8", field.reserved_bytes)
-            file.create_dataset(field.path, data=np.bytes_(b""), dtype=dtype)
+            file.create_dataset(field.path, data=np.bytes_(b""), dtype=text_type(b"", field.reserved_bytes))
         elif field.kind is Kind.INTEGER:
             file.create_dataset(field.path, data=np.int64(field.default))
         else:
@@ -59,12 +58,19 @@ def reserve_fields(file: h5py.File, fields: Sequence[Field]) -> None:
 
 
 def fill_fields(file: h5py.File, fields: Sequence[Field], value: Any) -> None:
-    """Fill reserved fields in place; a text that is too long is cut."""
+    """Fill reserved fields in place; a text that is too long is cut, one that is not ASCII stored anew."""
     for field in fields:
         content = operator.attrgetter(field.attribute)(value)
         if field.reserved_bytes:
             data = encode_text(field.path, _as_text(content))[: field.reserved_bytes]
-            file[field.path][()] = np.bytes_(data.decode("utf-8", "ignore").encode())
+            data = data.decode("utf-8", "ignore").encode()
+            kept = h5py.check_string_dtype(file[field.path].dtype)
+            if not data.isascii() and kept is not None and kept.encoding == "ascii":
+                del file[field.path]
+                dtype = text_type(data, field.reserved_bytes)
+                file.create_dataset(field.path, data=np.bytes_(data), dtype=dtype)
+            else:
+                file[field.path][()] = np.bytes_(data)
         else:
             file[field.path][()] = math.nan if content is None else content
 
@@ -73,7 +79,12 @@ def write_text(group: h5py.Group, name: str, text: str) -> None:
     """Store a text of fixed length; an empty one is left out. Raises MetadataError."""
     if text:
         data = encode_text(name, text)
-        group.create_dataset(name, data=np.bytes_(data), dtype=h5py.string_dtype("utf-8", len(data)))
+        group.create_dataset(name, data=np.bytes_(data), dtype=text_type(data, len(data)))
+
+
+def text_type(data: bytes, size: int) -> Any:
+    """Type of a text of `size` bytes: ASCII where that holds it, as Octave's `load` reads no UTF-8."""
+    return h5py.string_dtype("ascii" if data.isascii() else "utf-8", size)
 
 
 def write_number(group: h5py.Group, name: str, value: float | None, units: str = "") -> None:

@@ -6,6 +6,7 @@ Only runs in the trash are ever deleted.
 import contextlib
 import itertools
 import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import numpy as np
 
 from app.runs import errors, schema
 from app.runs.columns import sample_paths, stored_rows
-from app.runs.disk import atomic_write, make_folder, storage_error, sync_folder
+from app.runs.disk import atomic_write, make_folder, storage_error
 from app.runs.listing import check_folder_exists, find_run_files
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.metadata import EndMetadata
@@ -22,8 +23,8 @@ from app.runs.metadata_io import read_end_metadata, read_identifier
 from app.runs.paths import TRASH
 from app.runs.reader import check_openable, read_file
 from app.runs.rewrite import editing_lock
-from app.runs.validator import Validator
-from config.durable_files import remove_file, replace_file
+from app.runs.validator import Validator, shared_validator
+from config.durable_files import give_new_name, replace_file, sync_folder
 from messages.i18n import N_
 
 ASIDE = ".before-recovery"
@@ -42,14 +43,11 @@ def copy_run_into(path: Path, folder: Path) -> Path:
     with Validator.start() as validator:
         validator.validate(path)
     make_folder(folder)
-    target = _claim_name(folder / path.name)
-    try:
-        with atomic_write(target, replace=True) as temporary:
+    for target in _names(folder / path.name):
+        with contextlib.suppress(errors.RunExistsError), atomic_write(target) as temporary:
             shutil.copyfile(path, temporary)
-    except BaseException:
-        remove_file(target)
-        raise
-    return target
+            return target
+    raise _names_taken(folder, path)
 
 
 def move_to_trash(path: Path) -> Path:
@@ -97,12 +95,11 @@ def list_trash(folder: Path) -> list[Path]:
 
 def find_run_by_uuid(folder: Path, identifier: str) -> Path | None:
     """The run file of this UUID in a folder; files that are being recorded or not readable are skipped."""
-    with Validator() as validator:
-        for path in find_run_files(folder):
-            with contextlib.suppress(errors.RunError):
-                check_openable(path)
-                if validator.validate(path).identifier == identifier:
-                    return path
+    for path in find_run_files(folder):
+        with contextlib.suppress(errors.RunError):
+            check_openable(path)
+            if shared_validator().validate(path).identifier == identifier:
+                return path
     return None
 
 
@@ -115,6 +112,7 @@ class ExistingRun:
     end: EndMetadata | None
     has_additions: bool
     """Analyses or edits were added after it was recorded."""
+    raw_bytes_stored: bool
 
 
 def inspect_run(path: Path) -> ExistingRun | None:
@@ -124,12 +122,14 @@ def inspect_run(path: Path) -> ExistingRun | None:
         additions = bool(len(file[schema.HISTORY])) or any(
             name.startswith(schema.ANALYSIS_PREFIX) for name in file[schema.ENTRY]
         )
-        return ExistingRun(read_identifier(file), stored_rows(file), read_end_metadata(file), additions)
+        has_bytes = bool(len(file[schema.WIRE_DATA.path]))
+        return ExistingRun(
+            read_identifier(file), stored_rows(file), read_end_metadata(file), additions, has_bytes
+        )
 
     try:
         check_openable(path)
-        with Validator() as validator:
-            validator.validate(path)
+        shared_validator().validate(path)
         return read_file(path, inspect)
     except errors.RunError:
         return None
@@ -207,30 +207,25 @@ def _check_movable(path: Path) -> None:
 
 
 def _move(path: Path, folder: Path) -> Path:
-    """Claim a free name, then move: nothing is overwritten, whoever else moves at the same time."""
-    target = _claim_name(folder / path.name)
-    try:
-        replace_file(path, target)
-    except OSError as error:
-        remove_file(target)
-        raise storage_error(path, error) from None
-    for changed in (folder, path.parent):
-        with contextlib.suppress(OSError):  # the run is moved; only a power cut could still undo that
-            sync_folder(changed)
-    return target
-
-
-def _claim_name(path: Path) -> Path:
-    for number in range(1, _NAMES_MAX):
-        target = path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")
+    """Move to a free name: nothing is overwritten, whoever else moves at the same time."""
+    for target in _names(folder / path.name):
         try:
-            target.open("x").close()
+            give_new_name(path, target)
         except FileExistsError:
             continue
         except OSError as error:
-            raise storage_error(path.parent, error) from None
+            raise storage_error(path, error) from None
+        for changed in (folder, path.parent):
+            with contextlib.suppress(OSError):  # the run is moved; only a power cut could still undo that
+                sync_folder(changed)
         return target
-    raise _names_taken(path.parent, path)
+    raise _names_taken(folder, path)
+
+
+def _names(path: Path) -> Iterator[Path]:
+    """Names to try for a file, the wanted one first."""
+    yield path
+    yield from (path.with_name(f"{path.stem}-{number}{path.suffix}") for number in range(2, _NAMES_MAX))
 
 
 def _begins_with(ours: h5py.Dataset | None, theirs: h5py.Dataset, rows: int) -> bool:

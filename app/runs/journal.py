@@ -20,6 +20,7 @@ _HEADER = struct.Struct("<BxxxIq")
 """Kind, length, arrival time; a CRC-32 over these and the data follows, then the data."""
 _FRONT = struct.Struct("<BxxxIqI")
 _LENGTH_MAX = 1 << 26
+_SEARCHED_BYTES = 1 << 20
 
 
 class RecordKind(IntEnum):
@@ -75,6 +76,28 @@ def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
         while (record := _next(file, position)) is not None:
             position = record.end
             yield record
+
+
+def has_record_behind(path: Path, start: int) -> bool:
+    """Tell whether a whole record stands anywhere from byte `start` on. Raises OSError.
+
+    True for more than a megabyte, which is not searched: no power cut leaves so much that was not synced.
+    """
+    with path.open("rb") as file:
+        file.seek(start)
+        data = file.read(_SEARCHED_BYTES + 1)
+    if len(data) > _SEARCHED_BYTES:
+        return True
+    return any(_is_record(data, place) for place in range(len(data) - _FRONT.size + 1))
+
+
+def _is_record(data: bytes, start: int) -> bool:
+    number, length, _, checksum = _FRONT.unpack_from(data, start)
+    first = start + _FRONT.size
+    if number not in _KINDS or length > len(data) - first:
+        return False
+    before = zlib.crc32(data[start : start + _HEADER.size])
+    return bool(zlib.crc32(data[first : first + length], before) == checksum)
 
 
 def _next(file: IO[bytes], start: int) -> JournalRecord | None:

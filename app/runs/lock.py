@@ -33,7 +33,7 @@ class FileLock:
         """Take the lock. Raises LockHeldError, or OSError where the folder cannot be written to."""
         deadline = time.perf_counter() + _PATIENCE_S
         while True:  # a reader may hold it for the blink of its own test
-            file = self.path.open("a+b")
+            file = open(self.path, "a+b", opener=_open_itself)  # noqa: SIM115
             if _try_lock(file) and _is_still_at(file, self.path):
                 self._file = file
                 return self
@@ -59,6 +59,11 @@ class FileLock:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+def _open_itself(path: str, flags: int) -> int:
+    """Open a file, and nothing elsewhere that a link of its name leads to."""
+    return os.open(path, flags | getattr(os, "O_NOFOLLOW", 0), 0o666)
 
 
 def recording_lock(run: Path) -> FileLock:

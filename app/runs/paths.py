@@ -1,13 +1,17 @@
 """Where runs are kept."""
 
+import contextlib
+import errno
 import getpass
 import os
+import sys
 import tempfile
 from pathlib import Path
 
 import platformdirs
 
 import config
+from config.durable_files import make_folders
 from config.files import is_checkout, load_settings
 from config.schema import Settings
 
@@ -28,9 +32,26 @@ def journal_fallback_folders() -> list[Path]:
     ]
 
 
+def make_private_folder(folder: Path) -> None:
+    """Make a folder that only this user may enter. Raises OSError where it is another user's, or a link."""
+    make_folders(folder.parent)
+    with contextlib.suppress(FileExistsError):
+        folder.mkdir(0o700)
+    if not is_own_folder(folder):
+        raise PermissionError(errno.EPERM, os.strerror(errno.EPERM), str(folder))
+
+
+def is_own_folder(folder: Path) -> bool:
+    """Tell whether a folder is there and this user's: among temporary files anybody makes names."""
+    if folder.is_symlink() or not folder.is_dir():
+        return False
+    return sys.platform == "win32" or folder.stat().st_uid == os.geteuid()
+
+
 def journal_folders(runs: Path) -> list[Path]:
     """Folders that exist where journals of runs in one folder may lie: itself, and where they move to."""
-    return [folder for folder in (runs, *journal_fallback_folders()) if folder.is_dir()]
+    fallbacks = [folder for folder in journal_fallback_folders() if is_own_folder(folder)]
+    return [folder for folder in (runs, *fallbacks) if folder.is_dir()]
 
 
 def recordings_directory(settings: Settings | None = None) -> Path:

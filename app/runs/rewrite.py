@@ -9,12 +9,13 @@ import h5py
 
 from app.runs import schema
 from app.runs.columns import check_column, checksum, is_finished, sample_paths
-from app.runs.disk import check_free_space, storage_error, sync_file, sync_folder, temporary_copy
+from app.runs.disk import check_free_space, storage_error, sync_file, temporary_copy
 from app.runs.errors import UnsuitableRunError, WriteError, being_recorded, no_such_run
 from app.runs.lock import FileLock, LockHeldError, is_being_recorded
 from app.runs.validation import validate_file
-from config.durable_files import remove_file, replace_file
+from config.durable_files import remove_file, replace_file, sync_folder
 
+_PIECE_BYTES = 1 << 20
 _ROOM_BYTES = 1 << 22  # beyond the size of the file: a long analysis with its tables needs less than 1 MB
 
 
@@ -24,6 +25,10 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     `change` adds to the copy; samples and raw bytes must be the same afterwards. Raises RunNotFoundError,
     BeingRecordedError, UnsuitableRunError, DamagedRunError, DiskFullError, WriteError (the run is unchanged).
     """
+    if path.is_symlink() and path.resolve().parent != path.parent.resolve():  # which may be anybody's file
+        raise UnsuitableRunError(
+            "{path} is a link to {target}. Give that file", path=path, target=path.resolve()
+        )
     path = path.resolve()  # of a link the file is replaced, not the link
     if is_being_recorded(path):
         raise being_recorded(path)
@@ -45,7 +50,10 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
 
 def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> None:
     check_free_space(path.parent, path.stat().st_size + _ROOM_BYTES)
-    shutil.copy(path, copy)
+    remove_file(copy)
+    with path.open("rb") as file, copy.open("xb") as made:  # which follows no link of that name
+        shutil.copyfileobj(file, made, _PIECE_BYTES)
+    shutil.copymode(path, copy)
     with h5py.File(copy, "r+", locking="best-effort") as file:
         if not is_finished(file):
             raise UnsuitableRunError(

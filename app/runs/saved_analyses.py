@@ -29,6 +29,7 @@ from app.runs.fields import (
     read_fields,
     read_number,
     read_text,
+    text_type,
     write_fields,
     write_number,
     write_text,
@@ -240,7 +241,7 @@ def _write_table(group: h5py.Group, rows: list[dict[str, Any]]) -> None:
         column = [", ".join(x) if isinstance(x := row[name], list) else x for row in rows]
         if isinstance(column[0], str):
             data = [text.encode() for text in column]
-            kind = h5py.string_dtype("utf-8", max(1, *map(len, data)))
+            kind = text_type(b"".join(data), max(1, *map(len, data)))
             group.create_dataset(name, data=np.array(data, dtype=kind))
         else:
             group.create_dataset(name, data=np.array([math.nan if x is None else x for x in column], float))

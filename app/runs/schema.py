@@ -121,7 +121,7 @@ TIME_COLUMN: Final = Column(
     TIME,
     "device's or nominal clock, 0 at the first stored sample",
     "float64",
-    {"units": "s", "long_name": "time since the first stored sample"},
+    {"units": "s", "long_name": "time since the first stored sample (s)"},
     fill=float("nan"),
 )
 STATUS_COLUMN: Final = Column(
@@ -146,7 +146,7 @@ WIRE_ARRIVAL: Final = Column(
     f"{WIRE}/arrival_time",
     "monotonic time of the host after each read",
     "int64",
-    {"units": "ns", "long_name": "monotonic time of the host after the read"},
+    {"units": "ns", "long_name": "monotonic time of the host after the read (ns)"},
     chunk=4096,
     compressed=True,
 )

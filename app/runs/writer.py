@@ -5,6 +5,7 @@ above all at the close after a full disk, and the engine and its journal must su
 """
 
 import datetime
+import math
 import os
 import time
 import zlib
@@ -29,7 +30,7 @@ from app.runs.journal import JournalRecord, JournalSpan, RecordKind, UnreadableJ
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata, RunMetadata
 from app.runs.writer_client import ERRORS, Closed, Failed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand
-from config.durable_files import remove_file, replace_file
+from config.durable_files import remove_file, replace_file, sync_folder
 from drivers.samples import Losses
 from messages.i18n import N_
 
@@ -73,7 +74,7 @@ def create_run(
     path, layout, lock = path.absolute(), layout or BlockLayout(), recording_lock(path.absolute())
     try:
         lock.acquire()
-        file = create_file(path, metadata, layout, identifier)
+        file = create_file(path, metadata, layout, identifier, has_wire=journal is not None)
     except LockHeldError:
         raise RunExistsError(
             "{path} is being recorded by another program. Choose another name", path=path
@@ -111,6 +112,7 @@ def write_run(
         stored = writer.close(end)
         if replace:
             replace_file(target, path)
+            sync_folder(path.parent)
     except BaseException as error:
         remove_file(target)
         if isinstance(error, OSError):
@@ -161,8 +163,13 @@ class RunWriter:
         self.flush_if_due()
 
     def flush_if_due(self) -> None:
-        if self._pending and time.perf_counter() - self._flushed_at >= _FLUSH_S:
+        if self.flush_due_s <= 0.0:
             self.flush()
+
+    @property
+    def flush_due_s(self) -> float:
+        """Time until rows must be brought to disk, negative if it is over; infinite where there are none."""
+        return self._flushed_at + _FLUSH_S - time.perf_counter() if self._pending else math.inf
 
     def flush(self) -> None:
         """Bring all rows to disk, then the number of stored rows. Raises WriteError."""
@@ -191,7 +198,7 @@ class RunWriter:
             disk.truncate(self.path, size)
             self._verify()
             disk.sync_file(self.path)
-            disk.sync_folder(self.path.parent)
+            sync_folder(self.path.parent)
         except (OSError, RuntimeError) as error:
             self.usable = False
             raise disk.storage_error(self.path, error) from None
@@ -304,7 +311,8 @@ def _append(dataset: h5py.Dataset, values: NDArray[np.generic]) -> None:
 
 
 _QUEUE_COMMANDS = 64
-_IDLE_S = 0.05
+_IDLE_S = 5.0
+_LEAST_WAIT_S = 0.001
 
 
 def main() -> None:
@@ -329,7 +337,8 @@ class WriterServer:
         """Work until the input ends. After a failure Python must not close the file: HDF5 can hang."""
         try:
             while not self._commands.is_closed:
-                self._execute(self._commands.take(_IDLE_S))
+                due_s = self._writer.flush_due_s if self._writer else _IDLE_S
+                self._execute(self._commands.take(min(max(due_s, _LEAST_WAIT_S), _IDLE_S)))
             self._finish("interrupted", "the program that recorded ended")
         except RunError as error:
             self._fail(error)

@@ -194,6 +194,10 @@ class WriterClient:
     def close(self, ending: EndMetadata) -> "Future[StoredRun]":
         return self._ask(ending, self._closing)
 
+    def give_up(self, error: errors.RunError) -> None:
+        """Count as failed: the process gives no answer."""
+        self._fail(error)
+
     def stop(self) -> None:
         """End the process; a run still open is closed as interrupted."""
         self._child.stop(_STOP_S)

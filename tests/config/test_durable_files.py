@@ -9,7 +9,15 @@ from pathlib import Path
 import pytest
 
 from config import durable_files
-from config.durable_files import FileInUseError, is_in_use, remove_file, replace_file, sync_descriptor
+from config.durable_files import (
+    FileInUseError,
+    give_new_name,
+    is_in_use,
+    make_folders,
+    remove_file,
+    replace_file,
+    sync_descriptor,
+)
 from config.files import load_settings, save_settings, settings_path
 from config.schema import ConfigError, Settings
 
@@ -136,3 +144,30 @@ def test_a_share_that_cannot_do_that_is_synced_as_elsewhere(tmp_path, monkeypatc
     monkeypatch.setattr(os, "fsync", synced.append)
     sync_descriptor(7)
     assert synced == [7]
+
+
+@pytest.mark.parametrize("has_links", [True, False])
+def test_a_new_name_overwrites_nothing_and_leaves_one_file(files, monkeypatch, has_links):
+    """Also on a file system without links."""
+    new, old = files
+    if not has_links:
+
+        def link(*_arguments, **_options):
+            raise OSError(errno.EPERM, "no links here")
+
+        monkeypatch.setattr(os, "link", link)
+    with pytest.raises(FileExistsError):
+        give_new_name(new, old)
+    assert (new.read_text(), old.read_text()) == ("new", "old")
+    give_new_name(new, other := old.with_name("other"))
+    assert other.read_text() == "new"
+    assert not new.exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows syncs no folders")
+def test_each_folder_that_is_made_is_synced_in_its_parent(tmp_path, monkeypatch):
+    synced = []
+    monkeypatch.setattr(durable_files, "sync_folder", synced.append)
+    make_folders(tmp_path / "a" / "b")
+    make_folders(tmp_path / "a" / "b")
+    assert synced == [tmp_path, tmp_path / "a"]

@@ -137,7 +137,7 @@ def bench_in(place: Path, way: str) -> Iterator[Bench]:
     disk = contextlib.nullcontext() if way == "limit" else _small_disk(folder)
     options = SimulatedStandOptions(rate_hz=RATE_HZ, seed=1, table_drift_m_per_s=1e-3)
     files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
-    data_home, temp = _environment("XDG_DATA_HOME", str(refuge)), _environment("TMPDIR", str(temporary))
+    data_home, temp = environment("XDG_DATA_HOME", str(refuge)), environment("TMPDIR", str(temporary))
     with disk, SimulatedStand.start(options) as stand, data_home, temp:
         port = PortSettings(url=stand.port, protocol=options.protocol)
         with EngineClient.start(port, *files) as engine:
@@ -158,7 +158,7 @@ def _small_disk(folder: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _environment(name: str, value: str) -> Iterator[None]:
+def environment(name: str, value: str) -> Iterator[None]:
     before = os.environ.get(name)
     os.environ[name] = value
     try:

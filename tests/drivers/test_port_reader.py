@@ -5,6 +5,7 @@ import time
 import pytest
 
 from drivers.errors import DeviceLostError
+from drivers.source import CollectLimit
 from drivers.stream import BatchedReader, read_for
 
 
@@ -93,6 +94,15 @@ def test_a_computer_that_wakes_late_lets_less_gather(monkeypatch):
     assert gathering._longest_delay_s() == pytest.approx(0.005, rel=0.1)
     gathering._busy_until_s = time.perf_counter() - 0.1
     assert gathering._longest_delay_s() == pytest.approx(0.02, rel=0.1), "and as much as before after a while"
+
+
+def test_a_port_that_holds_more_lets_more_gather():
+    gathering, wire = BatchedReader(), Wire(*[b"ab"] * 10)
+    gathering.read(wire, 0.001, CollectLimit(8192, 4096))
+    gathering._bytes_per_s = 100_000.0
+    assert gathering._longest_delay_s() == pytest.approx(0.08, rel=0.1)
+    gathering._busy_until_s = time.perf_counter() + 10.0
+    assert gathering._longest_delay_s() == pytest.approx(0.04, rel=0.1)
 
 
 def test_a_lost_device_is_told_after_its_last_bytes():

@@ -1,17 +1,20 @@
 """The file of a journal, which moves to another folder when its own takes no more."""
 
 import contextlib
+import errno
 import logging
 import os
 import threading
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
-from app.runs.disk import has_free_space, sync_folder
+from app.runs.disk import has_free_space, unfinished_name
 from app.runs.journal import MAGIC
 from app.runs.lock import FileLock, LockHeldError, recording_lock
-from config.durable_files import sync_descriptor
+from app.runs.paths import make_private_folder
+from config.durable_files import give_new_name, make_folders, sync_descriptor, sync_folder
 
 _log = logging.getLogger(__name__)
 
@@ -26,6 +29,7 @@ class FileSync(threading.Thread):
     def __init__(self, descriptor: int) -> None:
         super().__init__(name="journal sync", daemon=True)
         self.failure: OSError | None = None  # known when the thread has ended
+        self.began_s = time.perf_counter()
         self._descriptor = os.dup(descriptor)
         self.start()
 
@@ -58,9 +62,25 @@ class JournalFile:
         self._lock = lock
         self._fallback_folders = list(fallback_folders)
         self._sync: FileSync | None = None
+        self._is_copied = False
+        self._is_made = True
+
+    def successor(self) -> "JournalFile":
+        """A journal of the same run that begins in a fallback folder; the first `append` makes its file."""
+        made = JournalFile(self.path, self._file, self._first, self._lock, self._fallback_folders)
+        made._is_made = False
+        return made
+
+    @property
+    def sync_began_s(self) -> float | None:
+        """When the sync began that is under way, by `time.perf_counter`; None for none."""
+        sync = self._sync
+        return sync.began_s if sync is not None and sync.is_alive() else None
 
     def append(self, record: bytes) -> None:
         """Write a record. Raises OSError where no folder takes it."""
+        while not self._is_made:
+            self._begin()
         while True:
             try:
                 _write_all(self._file, record)
@@ -94,7 +114,8 @@ class JournalFile:
     def close(self) -> None:
         if self._sync is not None:
             self._sync.join()
-        self._file.close()
+        if self._is_made:
+            self._file.close()
 
     def remove(self) -> None:
         with contextlib.suppress(OSError):
@@ -105,11 +126,25 @@ class JournalFile:
         with contextlib.suppress(OSError):
             self._lock.release()
 
+    def _begin(self) -> None:
+        """Make the file in the next fallback folder that takes it. Raises OSError where none does."""
+        while self._fallback_folders:
+            folder = self._fallback_folders.pop(0)
+            path = folder / self.path.name
+            with contextlib.suppress(OSError, LockHeldError):
+                make_private_folder(folder)
+                file, lock = _make_file(path, lambda made: _write_all(made, self._first))
+                self.path, self._file, self._lock, self._is_made = path, file, lock, True
+                self.size = len(self._first)
+                return
+        raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
+
     def _move(self, error: OSError) -> None:
         while self._fallback_folders:
             folder = self._fallback_folders.pop(0)
             if has_free_space(folder, self.size + _ROOM_BYTES):
                 with contextlib.suppress(OSError, LockHeldError):
+                    make_private_folder(folder)
                     self._move_to(folder / self.path.name)
                     self.move_cause = self.move_cause or error
                     _log.warning("journal moved to %s: %s", self.path, error)
@@ -118,32 +153,27 @@ class JournalFile:
         raise error
 
     def _move_to(self, path: Path) -> None:
-        with _new_file(path) as (file, lock):
-            is_copied = self._copy_to(file)
+        file, lock = _make_file(path, self._copy_to)
         with contextlib.suppress(OSError):
             self._file.close()
-        if is_copied:  # its run file may need the space
+        if self._is_copied:  # its run file may need the space
             self.remove()
         self.release()
         self._sync = None  # one of the old file that fails now does not concern the new one
         self.path, self._file, self._lock = path, file, lock
 
-    def _copy_to(self, file: IO[bytes]) -> bool:
-        """Copy all records to another file; False where only the first one could be had."""
-        is_readable = True
+    def _copy_to(self, file: IO[bytes]) -> None:
+        """Copy all records to another file, or the first one where no more can be had."""
+        self._is_copied = True
         try:
             for piece in self._pieces():
                 _write_all(file, piece)
         except _UnreadableError:
-            is_readable = False
+            self._is_copied = False
             file.seek(0)
             file.truncate()
             _write_all(file, self._first)
             self.size = len(self._first)
-        sync_descriptor(file.fileno())
-        with contextlib.suppress(OSError):
-            sync_folder(self.path.parent)
-        return is_readable
 
     def _pieces(self) -> Iterator[bytes]:
         left = self.size
@@ -168,24 +198,27 @@ def create_journal_file(
 ) -> JournalFile:
     """Create a journal with its first record. Raises OSError, FileExistsError, LockHeldError."""
     first = MAGIC + first_record
-    with _new_file(path) as (file, lock):
-        _write_all(file, first)
-        sync_folder(path.parent)
+    file, lock = _make_file(path, lambda made: _write_all(made, first))
     return JournalFile(path, file, first, lock, fallback_folders)
 
 
-@contextlib.contextmanager
-def _new_file(path: Path) -> Iterator[tuple[IO[bytes], FileLock]]:
-    """Create a file, its lock and its folder; the file and the lock go if the body fails."""
-    path.parent.mkdir(parents=True, exist_ok=True)
+def _make_file(path: Path, write: Callable[[IO[bytes]], None]) -> tuple[IO[bytes], FileLock]:
+    """Create a file with its folder and lock; it has its name once all that `write` writes is on disk."""
+    make_folders(path.parent)
     lock = recording_lock(path).acquire()
+    temporary = unfinished_name(path)
     with contextlib.ExitStack() as undo:
         undo.callback(lock.release)
-        file = path.open("xb", buffering=0)
+        undo.callback(temporary.unlink, missing_ok=True)
+        with temporary.open("xb", buffering=0) as made:
+            write(made)
+            sync_descriptor(made.fileno())
+        give_new_name(temporary, path)
         undo.callback(path.unlink)
-        undo.callback(file.close)
-        yield file, lock
+        sync_folder(path.parent)
+        file = path.open("ab", buffering=0)
         undo.pop_all()
+    return file, lock
 
 
 def _write_all(file: IO[bytes], data: bytes) -> None:

@@ -53,15 +53,45 @@ class Journal:
         self._records: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._failure: OSError | None = None
         self._is_ending = False
-        self._thread = threading.Thread(target=self._write, name="journal", daemon=True)
-        self._thread.start()
+        self._turn = threading.Lock()
+        self._task: tuple[float, bytes] | None = None
+        """Since when (s) the disk is at which record; an empty one for the last sync."""
+        self.left: Path | None = None
+        """Journal on a disk that hangs, with all that came until then."""
+        self._thread = self._start(file)
 
     @property
     def path(self) -> Path:
         return self._file.path
 
     @property
+    def stalled_s(self) -> float:
+        """For how long the disk has been at one record or one sync; 0 where it is at none."""
+        task, sync_began_s = self._task, self._file.sync_began_s
+        began = [] if task is None else [task[0]]
+        began += [] if sync_began_s is None else [sync_began_s]
+        return time.perf_counter() - min(began) if began else 0.0
+
+    def leave_hanging_disk(self) -> bool:
+        """Go on in a fallback folder if the disk is at one record still; what it has stays there."""
+        with self._turn:
+            if self._task is None or self.left is not None:
+                return False
+            (_, record), old, self._task = self._task, self._file, None
+            self.left = old.path
+            self._file = file = old.successor()
+        _log.error("the disk of %s hangs", old.path)
+        self._thread = self._start(file, record)
+        return True
+
+    @property
     def move_message(self) -> Message:
+        if self.left is not None:
+            template = N_(
+                "the disk of the run hangs: what came before is in {left}, the received bytes since are kept"
+                " in {path}"
+            )
+            return message(template, left=self.left, path=self.path)
         error = self._file.move_cause
         if error is None:
             return EMPTY
@@ -114,16 +144,29 @@ class Journal:
         if self._failure is not None:
             raise _error(self.path, self._failure)
 
-    def _write(self) -> None:
+    def _start(self, file: JournalFile, first: bytes | None = None) -> threading.Thread:
+        thread = threading.Thread(target=self._write, args=(file, first), name="journal", daemon=True)
+        thread.start()
+        return thread
+
+    def _write(self, file: JournalFile, first: bytes | None) -> None:
         """Thread: append records and sync each tenth of a second, until the end is queued."""
         try:
-            while self._write_for(self._SYNC_S):
+            if first is not None:
+                self._do(file, first)
+            while not self._is_ending and self._write_for(file, self._SYNC_S):
                 pass
-            self._file.close()
+            if self._is_ending:
+                self._do(file, b"")
+            file.close()
+        except _LeftError:
+            with contextlib.suppress(OSError):
+                file.close()
+            file.release()
         except Exception as error:  # a journal that ends unseen would be taken for a slow disk
             _log.error("the journal %s has failed: %s", self.path, error)
             with contextlib.suppress(OSError):
-                self._file.close()
+                file.close()
             self._failure = (
                 error if isinstance(error, OSError) else OSError(f"{type(error).__name__}: {error}")
             )
@@ -135,21 +178,36 @@ class Journal:
         self._is_ending = record is None
         return record
 
-    def _write_for(self, duration_s: float) -> bool:
+    def _write_for(self, file: JournalFile, duration_s: float) -> bool:
         record = self._next()
         deadline = time.perf_counter() + duration_s
         while record is not None:
-            self._file.append(record)
-            self.written += len(record)
+            self._do(file, record)
             try:
                 record = self._next(max(0.0, deadline - time.perf_counter()))
             except queue.Empty:
                 break
         if record is None:
-            self._file.sync()
             return False
-        self._file.begin_sync()
+        file.begin_sync()
         return True
+
+    def _do(self, file: JournalFile, record: bytes) -> None:
+        """Append a record; an empty one syncs. Raises OSError, _LeftError once another thread does it."""
+        self._task = time.perf_counter(), record
+        if record:
+            file.append(record)
+        else:
+            file.sync()
+        with self._turn:
+            if self._file is not file:
+                raise _LeftError
+            self.written += len(record)
+            self._task = None
+
+
+class _LeftError(Exception):
+    """The disk went on after its journal was left."""
 
 
 def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence[Path] = ()) -> Journal:

@@ -128,7 +128,8 @@ class JournalSummary:
     named: Named | None
     ended: Ended | None
     wire_bytes: int
-    is_torn: bool  # there is more behind the last whole record
+    end: int
+    """Byte after the last whole record; behind it nothing is trusted."""
 
     @property
     def rate_hz(self) -> float:
@@ -148,7 +149,6 @@ def read_summary(path: Path) -> JournalSummary:
             else:
                 decoded = _decode(path, record)
                 records[type(decoded)] = decoded
-        is_torn = path.stat().st_size > end
     except OSError as error:
         raise RecoveryError(
             "{path} cannot be read ({reason}). Check its rights", path=path, reason=error.strerror or error
@@ -170,7 +170,7 @@ def read_summary(path: Path) -> JournalSummary:
         named=records.get(Named),
         ended=records.get(Ended),
         wire_bytes=wire_bytes,
-        is_torn=is_torn,
+        end=end,
     )
 
 

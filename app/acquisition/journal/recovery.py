@@ -18,7 +18,7 @@ from app.acquisition.errors import RecoveryError
 from app.acquisition.journal.rebuild import RebuiltRun, rebuild
 from app.acquisition.journal.records import JournalSummary, read_summary
 from app.runs.creation import remove_abandoned
-from app.runs.disk import has_free_space, is_writable, storage_error, sync_folder
+from app.runs.disk import has_free_space, is_writable, storage_error
 from app.runs.errors import RunError
 from app.runs.file_operations import (
     ExistingRun,
@@ -28,10 +28,10 @@ from app.runs.file_operations import (
     move_to_free_name,
     replace_by_recovered,
 )
-from app.runs.journal import find_journals
+from app.runs.journal import find_journals, has_record_behind
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.schema import SUFFIX
-from config.durable_files import remove_file
+from config.durable_files import remove_file, sync_folder
 from messages.i18n import N_
 from messages.message import EMPTY, Message, as_message, message, message_of
 
@@ -40,6 +40,7 @@ _log = logging.getLogger(__name__)
 Progress = Callable[[float], None]
 
 _ROOM_RATIO = 8  # bytes of a run file for each of its journal, at most: a device may send few bytes for a row
+_TEMPLATE_BYTES = 1 << 20  # of a run file, before its first row
 _WRITER_S = 20.0
 """The writer of a dead engine closes its file by itself, which takes as long as that is large."""
 
@@ -49,7 +50,7 @@ class RecoveryState(StrEnum):
 
     RECOVERED = "recovered"
     WHOLE = "whole"  # the run file holds all of it already; only the journal was left over
-    EMPTY = "empty"  # it ended before the first byte came; it was removed
+    EMPTY = "empty"  # it ended before the first whole read was in it; it was removed
     BEING_RECORDED = "being-recorded"
     FAILED = "failed"
 
@@ -131,7 +132,7 @@ def _place(summary: JournalSummary, original_folder: Path | None) -> Path:
 
 
 def _recover(summary: JournalSummary, place: Path, progress: Progress) -> Recovery:
-    if not summary.wire_bytes and not summary.is_torn:
+    if not summary.wire_bytes and not has_record_behind(summary.path, summary.end):
         return Recovery(str(summary.path), RecoveryState.EMPTY)
     _await_writer(summary, place)
     earlier = _earlier_file(summary, place)
@@ -185,7 +186,18 @@ def _earlier_file(summary: JournalSummary, folder: Path) -> Path | None:
         beside = folder / Path(summary.named.path).name  # no other path of a file is followed
         if beside.suffix == SUFFIX and beside.is_file() and _identifier(beside) in (identifier, ""):
             return beside
-    return find_run_by_uuid(folder, identifier)
+    return find_run_by_uuid(folder, identifier) or _torn_file(summary, folder)
+
+
+def _torn_file(summary: JournalSummary, folder: Path) -> Path | None:
+    """A file of the run's name that a power cut tore: nothing reads it, but its UUID stands in it."""
+    identifier = summary.header.identifier.encode()
+    for path in sorted(folder.glob(f"{_stem(summary)}_*{SUFFIX}")):
+        with path.open("rb") as file:
+            is_of_run = identifier in file.read(_TEMPLATE_BYTES)
+        if is_of_run and inspect_run(path) is None:
+            return path
+    return None
 
 
 def _identifier(path: Path) -> str:

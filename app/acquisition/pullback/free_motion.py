@@ -3,6 +3,7 @@
 import math
 from collections import deque
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -36,6 +37,9 @@ _SLIP_NOISES = 6.0
 _SLIP_M = 20e-6
 _BINS_TO_SLIP = 2
 _UNDECIDED = (PullbackState.RELEASED, PullbackState.NO_SLIP)
+
+
+_Reading = TypeVar("_Reading", float, Floats)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,13 +82,22 @@ class Hold:
         self._noise_m = level.noise_m
         self._references.append(reference)
 
+    def contains(self, table_m: Floats) -> bool:
+        """Tell whether none of these averages (n,) is beyond the limit."""
+        return not self._references or bool((self._gone_m(table_m) <= self._limit_m).all())
+
     def detect_release(self, table_m: float) -> bool:
         """Take the next average; return whether the table leaves its hold towards its zero."""
         if self._references:
-            gone_m = self._side * (self.reference.table_m - table_m)
-            limit_m = max(_RELEASE_NOISES * self._noise_m, _CREEP * self._pulled_m)
-            self._beyond = self._beyond + 1 if gone_m > limit_m else 0
+            self._beyond = self._beyond + 1 if self._gone_m(table_m) > self._limit_m else 0
         return self._beyond >= self._bins_to_release
+
+    @property
+    def _limit_m(self) -> float:
+        return max(_RELEASE_NOISES * self._noise_m, _CREEP * self._pulled_m)
+
+    def _gone_m(self, table_m: _Reading) -> _Reading:
+        return self._side * (self.reference.table_m - table_m)
 
 
 class FreeMotion:

@@ -6,6 +6,8 @@ rest again. All times are sample indices, so that the machine works alike live, 
 
 import math
 
+import numpy as np
+
 from app.acquisition.messages import EndReason, PullbackState, StandPosition
 from app.acquisition.pullback.averages import (
     BinAverager,
@@ -14,6 +16,7 @@ from app.acquisition.pullback.averages import (
     StationaryLevel,
     ZeroEstimator,
     ZeroLevel,
+    mean_m,
     noise_m,
 )
 from app.acquisition.pullback.early_release import EarlyReleaseDetector
@@ -127,62 +130,70 @@ class PullbackStateMachine:
         bins, seen = self._binning.add(first_index, table_m, relative_m), 0
         while seen < len(bins):
             until_tick = self._bins_per_tick - self._bins % self._bins_per_tick
-            some = bins[seen : seen + (until_tick if self._is_settled else 1)]
+            some = bins[seen : seen + until_tick]
+            if not self._is_quiet(some):
+                some = some[:1]
             self._on_bins(some)
             seen += len(some)
         self._keep_time(first_index + len(table_m))
         transitions, self._transitions = self._transitions, []
         return transitions
 
-    @property
-    def _is_settled(self) -> bool:
-        """Only checks at ticks are left: the bins between them are taken in one piece, which costs less."""
+    def _is_quiet(self, bins: BinAverages) -> bool:
+        """Tell whether only the check at a tick is left of bins: taken in one piece they cost less."""
         if self._free is not None and self.state in _FREE:
             return self._free.is_settled
-        return self.state not in _WAITING
+        if self.is_at_rest:
+            return self._rest.farthest_m(bins.table_m) <= self._limit_at_rest_m()
+        if self.state in _WAITING and self._hold is not None:
+            return self._hold.contains(bins.table_m)
+        return True
 
     def _on_bins(self, bins: BinAverages) -> None:
         self._readings.add(bins)
         self._bins += len(bins)
         is_tick = self._bins % self._bins_per_tick == 0
-        index, table_m = bins.center[-1].item(), bins.table_m[-1].item()
+        index = bins.center[-1].item()
         self._last_reading = index
         if self._free is not None and self.state in _FREE:
             self._on_free(self._free, bins, is_tick)
         elif self.is_at_rest:
-            self._on_rest(index, table_m, is_tick)
+            self._on_rest(index, bins.table_m, is_tick)
         elif self.state in _WAITING:
-            self._on_pulled(index, table_m, is_tick)
+            self._on_pulled(index, bins.table_m, is_tick)
 
     # --- at rest ---
 
-    def _on_rest(self, index: float, table_m: float, is_tick: bool) -> None:
-        is_recentring = self.state is PullbackState.RECENTRE  # the hand that moves the plate moves the table
-        limit_m = _PULLED * self._plan.nominal_m if is_recentring else self._noticed_m()
-        if self._rest.pulled_m(table_m) > limit_m:
+    def _limit_at_rest_m(self) -> float:
+        if self.state is PullbackState.RECENTRE:  # the hand that moves the plate moves the table
+            return _PULLED * self._plan.nominal_m
+        return self._noticed_m()
+
+    def _on_rest(self, index: float, table_m: Floats, is_tick: bool) -> None:
+        if self._rest.farthest_m(table_m) > self._limit_at_rest_m():
             self._begin_pull(index)
         elif is_tick and (level := self._still(_ZERO_S)) is not None:
             self._add_rest(index, level)
 
     def _add_rest(self, index: float, level: StationaryLevel) -> None:
-        if self._readings.table.drift_m_per_s(_ZERO_S, _DRIFT_M_PER_S):
+        if self._readings.table.drift_m_per_s(_ZERO_S, _DRIFT_M_PER_S, level.noise_m):
             return
         is_first = not self._rest.has_levels and self.measurement.zero_m is None
         if is_first and abs(level.mean_m) > _PULLED * self._plan.nominal_m:
             self._is_pulled = True
             self._enter(PullbackState.PULLING, index, ALREADY_PULLED_NOTE, is_stored=True)
             return
-        if self._is_plate_moving(index):
+        relative_m = self._readings.relative.mean(_ZERO_S, index)
+        if not math.isnan(relative_m) and self._is_plate_moving():
             self._rest.reset()
             return
-        self._rest.add(ZeroLevel(level.since, level.mean_m, self._readings.relative.mean(_ZERO_S, index)))
+        self._rest.add(ZeroLevel(level.since, level.mean_m, relative_m))
         if self._rest.is_known:
             self._set_zero(self._rest.latest)
             self._check_plate(index)
 
-    def _is_plate_moving(self, index: float) -> bool:
-        is_seen = not math.isnan(self._readings.relative.mean(_ZERO_S, index))
-        return is_seen and self._readings.relative.stationary(_ZERO_S, _CREEP * self._plan.nominal_m) is None
+    def _is_plate_moving(self) -> bool:
+        return self._readings.relative.stationary(_ZERO_S, _CREEP * self._plan.nominal_m) is None
 
     def _check_plate(self, index: float) -> None:
         room, plate_m = self._room, math.nan if self.measurement.plate_m is None else self.measurement.plate_m
@@ -218,9 +229,9 @@ class PullbackStateMachine:
 
     # --- pulled back ---
 
-    def _on_pulled(self, index: float, table_m: float, is_tick: bool) -> None:
-        self._farthest_m = max(self._farthest_m, abs(table_m - self._zero_m()))
-        if self._hold is not None and self._hold.detect_release(table_m):
+    def _on_pulled(self, index: float, table_m: Floats, is_tick: bool) -> None:
+        self._farthest_m = max(self._farthest_m, np.abs(table_m - self._zero_m()).max().item())
+        if self._hold is not None and self._hold.detect_release(table_m[-1].item()):
             self._release(self._hold, index)
         elif is_tick and not (self._hold is not None and self._hold.is_leaving):
             self._check_hold(index)
@@ -399,12 +410,11 @@ class PullbackStateMachine:
         return level
 
     def _reference(self, index: float) -> HoldReference:
-        relative = self._readings.relative.latest(_HOLD_S)[:, 1]
-        noise = noise_m(relative)
-        mean_m = self._readings.relative.mean(_REFERENCE_S, index)
+        noise = noise_m(self._readings.relative.latest(_HOLD_S)[:, 1])
+        relative_m = self._readings.relative.mean(_REFERENCE_S, index)
         count = max(1, len(self._readings.relative.latest(_REFERENCE_S)))
-        table_m = float(self._readings.table.latest(_REFERENCE_S)[:, 1].mean())
-        return HoldReference(table_m, mean_m, noise, noise / math.sqrt(count))
+        table_m = mean_m(self._readings.table.latest(_REFERENCE_S))
+        return HoldReference(table_m, relative_m, noise, noise / math.sqrt(count))
 
     def _span(self, duration_s: float) -> float:
         return duration_s * self._plan.rate_hz

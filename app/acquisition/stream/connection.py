@@ -12,7 +12,7 @@ from drivers.errors import DriverError, QueueFullError, SettingsError
 from drivers.host_time import host_ns
 from drivers.pair.link import open_pair
 from drivers.pair.source import PairSource, make_pair
-from drivers.port import OpenPort, PortConfig, PortInfo
+from drivers.port import OpenPort, Port, PortConfig, PortInfo
 from drivers.registry import find_driver
 from drivers.source import CancellableLink
 from drivers.stream import PortReader, ReaderEnd, SampleSource, read_for
@@ -141,6 +141,8 @@ class Connection:
         self.last_poll_ns = self.start_ns
         """Host's time when the port was looked at the last time, whether anything came or not."""
         self._source = source
+        if isinstance(port, Port):
+            source.collect_limit = port.collect_limit
         self._queue = read_queue
         self._ended: ReaderEnd | None = None
         if first:

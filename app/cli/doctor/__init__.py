@@ -46,6 +46,9 @@ def fail(subject: str, message: str, remedy: str) -> Finding:
 
 def doctor(options: DoctorOptions) -> None:
     target = out.output_file(options.bundle, options.force) if options.bundle else None
+    if options.compile_code:
+        out.print_status("compiling, up to a minute and a half")
+        import_module("app.cli.doctor.compilation").compile_all()
     findings = []
     for finding in _findings():
         findings.append(finding)

@@ -17,6 +17,7 @@ from app.presenters.number_text import format_fixed
 from app.qt.theme import Theme, colour
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plots import PlotStack
+from app.qt.widgets.text import set_tool_tip
 from messages.i18n import N_, gettext
 
 _WIDTH, _SPREAD = 0.36, 0.22
@@ -41,8 +42,8 @@ class FrictionPlot(QWidget):
         self._theme = theme
         self._contacts: tuple[ContactBars, ...] = ()
         self._items: list[Any] = []
-        self.setToolTip(
-            gettext("Bars: mean over the series with its 95 % interval; points: series; ▲ at least")
+        set_tool_tip(
+            self, gettext("Bars: mean over the series with its 95 % interval; points: series; ▲ at least")
         )
         self._stack = PlotStack(theme, (("", "text"),), format_point=_format_point)
         self._stack.table = self._table

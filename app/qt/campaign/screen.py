@@ -17,7 +17,7 @@ from app.qt.widgets.folder_button import FolderButton, OpenFolderButton
 from app.qt.widgets.inputs import CheckBox, ProgressBar, ask_for_folder, make_button
 from app.qt.widgets.layouts import STRETCH, clear, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
-from app.qt.widgets.text import ElidedLabel, break_path, label, show_chip
+from app.qt.widgets.text import ElidedLabel, break_path, label, set_tool_tip, show_chip
 from messages.i18n import N_, gettext, ngettext
 
 _COLUMN_WIDTH = 360
@@ -45,9 +45,9 @@ class CampaignScreen(QWidget):
         self._count_simulated = CheckBox("")
         self._count_simulated.clicked.connect(presenter.navigator.count_simulated)
         hint = gettext("In the table, the figures and what is exported, beside recorded runs")
-        self._count_simulated.setToolTip(hint)
+        set_tool_tip(self._count_simulated, hint)
         self._keep = make_button("", presenter.save_results)
-        self._keep.setToolTip(gettext("Keep new results in their runs: the next gathering is quicker"))
+        set_tool_tip(self._keep, gettext("Keep new results in their runs: the next gathering is quicker"))
         self._export = QPushButton(gettext("Export…"))
         self._undo = make_button(gettext("Undo"), presenter.undo)
         title = gettext("Gather the runs of a folder")
@@ -117,7 +117,7 @@ class CampaignScreen(QWidget):
         of_all = gettext("Campaign: {runs} in {series} series", runs=counted, series=summary.series_count)
         self._title.setText(of_all if summary.run_count else gettext("Campaign"))
         self._folder.folder = state.folder
-        self._folder.setToolTip(gettext("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
+        set_tool_tip(self._folder, gettext("{folder}\nGather another folder (Ctrl+L)", folder=state.folder))
         self._keep.setText(ngettext("Keep {count} result", "Keep {count} results", summary.unsaved_count))
         self._keep.setVisible(summary.unsaved_count > 0 and state.progress is None)
         self._undo.setEnabled(bool(state.undo_text))
@@ -198,7 +198,7 @@ class _Working(QWidget):
         if progress is not None:
             metrics, middle = self._words.fontMetrics(), Qt.TextElideMode.ElideMiddle
             self._words.setText(metrics.elidedText(progress.text, middle, _WORDS_WIDTH))
-            self._words.setToolTip(progress.text)
+            set_tool_tip(self._words, progress.text)
 
 
 class _Empty(QFrame):

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 from app.presenters.campaign.state import Cell, TableRow, all_columns
 from app.qt.theme import TextRole, Theme, font
 from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, TitleHeader, serve_table
+from app.qt.widgets.text import set_tool_tip
 from app.qt.window_geometry import persist_layout
 from messages.i18n import gettext, ngettext
 
@@ -163,7 +164,7 @@ def _title_item(title: str, name: str, hint: str = "") -> QTableWidgetItem:
     item = QTableWidgetItem(title)
     side = Qt.AlignmentFlag.AlignLeft if name == _SERIES else Qt.AlignmentFlag.AlignRight
     item.setTextAlignment(side | Qt.AlignmentFlag.AlignVCenter)
-    item.setToolTip(hint)
+    set_tool_tip(item, hint)
     item.setData(NAME_ROLE, name)
     return item
 
@@ -180,5 +181,5 @@ def _item(first: _Line, second: _Line, side: Qt.AlignmentFlag, hint: str) -> QTa
     item = QTableWidgetItem(first[0])
     item.setTextAlignment(side)
     item.setData(_LINES, [line for line in (first, second) if line[0]])
-    item.setToolTip(hint)
+    set_tool_tip(item, hint)
     return item

@@ -34,7 +34,7 @@ from app.qt.widgets.plot_marks import pen
 from app.qt.widgets.plots import PlotStack
 from app.qt.widgets.shortcuts import bind_button
 from app.qt.widgets.tables import serve_table
-from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, show_chip, stopped_chip
+from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, set_tool_tip, show_chip, stopped_chip
 from messages.i18n import N_, gettext
 
 _COLUMN_WIDTH = 256
@@ -133,7 +133,7 @@ class _ReadingColumn(QWidget):
         self._dial = QLineEdit()
         self._dial.setPlaceholderText(gettext("dial reading, mm"))
         self._dial.setAccessibleName(gettext("Dial reading in millimetres"))
-        self._dial.setToolTip(gettext("Enter averages the counts and takes the reading"))
+        set_tool_tip(self._dial, gettext("Enter averages the counts and takes the reading"))
         self._dial.returnPressed.connect(self._take)
         self._waiting = label(wrap=True)
         self._undo = make_button(gettext("Undo"), presenter.undo)

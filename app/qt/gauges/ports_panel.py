@@ -11,7 +11,7 @@ from app.qt.theme import TextRole
 from app.qt.widgets.inputs import CheckBox, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, set_text_or_hide, show_chip
+from app.qt.widgets.text import label, set_text_or_hide, set_tool_tip, show_chip
 from messages.i18n import N_, gettext
 
 _EMPTY = N_("No serial port is plugged into this computer. Plug the amplifier in, then look again.")
@@ -30,8 +30,9 @@ class PortsPanel(QWidget):
         self._look = make_button(gettext("Look at the ports"), presenter.probe)
         self._stop = make_button(gettext("Stop looking"), presenter.cancel)
         self._query_silent = CheckBox(gettext("Ask silent devices, too"))
-        self._query_silent.setToolTip(
-            gettext("Sends each silent device questions that only read. Without it nothing is sent to any.")
+        set_tool_tip(
+            self._query_silent,
+            gettext("Sends each silent device questions that only read. Without it nothing is sent to any."),
         )
         self._progress = label(muted=True, wrap=True)
         self._message = label(wrap=True)

@@ -11,7 +11,7 @@ from app.presenters.identify.report import ReportPresenter, ReportState
 from app.qt.widgets.folder_button import OpenFolderButton
 from app.qt.widgets.layouts import STRETCH, make_row
 from app.qt.widgets.shortcuts import add_shortcut
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_tool_tip, show_chip
 from messages.i18n import gettext
 
 
@@ -34,7 +34,7 @@ class ExportMenu(QPushButton):
         words = gettext("Report, samples and coefficients, folder of the run")
         add_shortcut(screen, "Ctrl+E", words, self.click)
         add_shortcut(screen, "Ctrl+P", gettext("Print the report of the run"), self._print.trigger)
-        self.setToolTip(f"{words} (Ctrl+E)")
+        set_tool_tip(self, f"{words} (Ctrl+E)")
 
     def show_state(self, state: ReportState) -> None:
         self.setEnabled(bool(state.run) and not state.is_busy)

@@ -11,7 +11,15 @@ from app.presenters.results import Result, ResultRow
 from app.qt.theme import TextRole
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.selectable_rows import GridRow, SelectableRows
-from app.qt.widgets.text import ValueLabel, break_path, label, plain_text, show_chip, symbol_text
+from app.qt.widgets.text import (
+    ValueLabel,
+    break_path,
+    label,
+    plain_text,
+    set_tool_tip,
+    show_chip,
+    symbol_text,
+)
 from messages.i18n import gettext
 
 
@@ -67,7 +75,7 @@ class ResultsPanel(QWidget):
         button.setProperty("role", "row")
         button.setCheckable(True)
         button.setChecked(row.is_shown)
-        button.setToolTip(gettext("Show the curves and results of this law"))
+        set_tool_tip(button, gettext("Show the curves and results of this law"))
         law = " ".join(filter(None, (row.law, row.effects)))
         button.setAccessibleName(gettext("{law}: show its curves and results", law=law))
         button.clicked.connect(lambda: self._choose(button, row))
@@ -176,7 +184,7 @@ def _heads(titles: Iterable[str]) -> Sequence[QWidget]:
 
 def _classical_cells(row: ClassicalRow) -> Sequence[QWidget]:
     classical = label(row.classical, wrap=len(row.classical) > 24)
-    classical.setToolTip(row.hint)
+    set_tool_tip(classical, row.hint)
     return label(row.symbol), label(row.name, muted=True, wrap=True), classical, label(row.fitted)
 
 

@@ -16,7 +16,15 @@ from app.qt.theme import TextRole, Theme, colour, set_property
 from app.qt.widgets.inputs import ProgressBar, ShortcutSafeEdit, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
-from app.qt.widgets.text import ValueLabel, break_path, label, padded, set_text_or_hide, show_chip
+from app.qt.widgets.text import (
+    ValueLabel,
+    break_path,
+    label,
+    padded,
+    set_text_or_hide,
+    set_tool_tip,
+    show_chip,
+)
 from messages.i18n import N_, gettext
 
 _ESTIMATES_MAX = 3
@@ -245,7 +253,7 @@ class DecisionPanel(QFrame):
         self._dispatch = dispatch
         self._note = ShortcutSafeEdit()
         self._note.setPlaceholderText(gettext("Note, kept with the run (N)"))
-        self._note.setToolTip(gettext("Enter keeps the run with this note, Esc leaves the field"))
+        set_tool_tip(self._note, gettext("Enter keeps the run with this note, Esc leaves the field"))
         self._note.setAccessibleName(gettext("Note on this run"))
         self._note.textEdited.connect(lambda note: dispatch(NoteEdited(note)))
         self._note.left.connect(leave_note)
@@ -275,5 +283,5 @@ class DecisionPanel(QFrame):
         if keys:
             bind_button(button, keys, gettext(description), self)
         else:  # the run bar has the shortcut
-            button.setToolTip(gettext(description))
+            set_tool_tip(button, gettext(description))
         return button

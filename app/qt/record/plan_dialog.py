@@ -18,7 +18,7 @@ from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ESCAPE_AND_ENTER, CheckBox, ShortcutSafeEdit, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import bind_button
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_tool_tip, show_chip
 from messages.i18n import N_, gettext
 
 _HELP = N_(
@@ -160,4 +160,4 @@ def _show_cell(table: QTableWidget, row: int, column: int, text: str, hint: str)
     if item.text() != text:
         item.setText(text)
     if column != _REPEATS:  # any change of a cell would take away what is being typed there
-        item.setToolTip(hint)
+        set_tool_tip(item, hint)

@@ -27,7 +27,7 @@ from app.qt.widgets.inputs import (
 )
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import ENTER_KEYS, add_shortcut, bind_button, set_button_hint
-from app.qt.widgets.text import ElidedLabel, label
+from app.qt.widgets.text import ElidedLabel, button_text, label, set_tool_tip
 from messages.i18n import N_, gettext, ngettext
 
 _BUTTONS = {
@@ -98,7 +98,7 @@ class RunBar(QFrame):
         choosable = choices.editable and not choices.series_fixed
         self._series.setEnabled(choosable)
         hint = gettext("Series of the next run: pullback, contact, added mass")
-        self._series.setToolTip(choices.series_hint or hint)
+        set_tool_tip(self._series, choices.series_hint or hint)
         self._strip.show_plan(plan, choices.series, choosable=choosable)
         planned = gettext("Plan {done}/{planned}", done=plan.done, planned=plan.planned)
         self._plan.setText(planned if plan.planned else gettext("Plan"))
@@ -194,8 +194,8 @@ class PlanStrip(QWidget):
         while len(self._buttons) < len(plan.progress):
             self._add_button()
         for button, one in zip(self._buttons, plan.progress, strict=False):
-            button.setText(f"{one.series}  {one.dots}")
-            button.setToolTip(one.description)
+            button.setText(button_text(f"{one.series}  {one.dots}"))
+            set_tool_tip(button, one.description)
             button.setAccessibleName(one.description)
             button.setEnabled(choosable)
             state = "now" if one.series == series else "full" if one.is_full else "ahead"
@@ -213,7 +213,7 @@ class PlanStrip(QWidget):
         hidden = len(self._progress) - (end - first)
         self._more.setText(f"+{hidden}")
         more = ngettext("One more series is planned", "{count} more series are planned", hidden)
-        self._more.setToolTip(more)
+        set_tool_tip(self._more, more)
         self._more.setVisible(hidden > 0)
         self._empty.setVisible(not self._progress and self._empty.sizeHint().width() <= self.width())
 

@@ -22,7 +22,7 @@ from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.inputs import make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import bind_button, set_button_hint
-from app.qt.widgets.text import label, padded, set_text_or_hide, show_chip
+from app.qt.widgets.text import label, padded, set_text_or_hide, set_tool_tip, show_chip
 from messages.i18n import gettext
 
 _COLUMN_SHARE = 0.31
@@ -193,7 +193,7 @@ class StatusBarWidget(QFrame):
             if (excess := self._excess(spacing)) > 0:
                 room = max(target.sizeHint().width() - excess, _ELIDED_MIN)
                 target.setText(target.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, room))
-                target.setToolTip(target.toolTip() or text)
+                set_tool_tip(target, target.toolTip() or text)
 
     def _excess(self, spacing: int) -> int:
         """Pixels by which the labels are too wide."""

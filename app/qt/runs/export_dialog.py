@@ -11,7 +11,7 @@ from app.qt.theme import TextRole
 from app.qt.widgets import inputs
 from app.qt.widgets.folder_button import OpenFolderButton
 from app.qt.widgets.layouts import make_column, make_form_grid, make_row
-from app.qt.widgets.text import label, set_text_or_hide, show_chip
+from app.qt.widgets.text import label, set_text_or_hide, set_tool_tip, show_chip
 from messages.i18n import gettext, ngettext
 
 
@@ -51,8 +51,9 @@ class ExportDialog(QDialog):
         self._content.setCurrentIndex(self._content.findData(state.content))
         if self._output.text() != state.output:
             self._output.setText(state.output)
-        self._output.setToolTip(
-            gettext("A folder, made if it is not there") if state.is_folder else gettext("The file to write")
+        set_tool_tip(
+            self._output,
+            gettext("A folder, made if it is not there") if state.is_folder else gettext("The file to write"),
         )
         self._replace.setChecked(state.replace)
         self._preview.setPlainText(state.preview or gettext("Making a preview"))

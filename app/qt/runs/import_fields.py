@@ -12,7 +12,7 @@ from app.presenters.runs.import_presenter import ImportState
 from app.qt.theme import TextRole
 from app.qt.widgets.inputs import ComboBox, make_choice
 from app.qt.widgets.layouts import make_column, make_form_grid
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_tool_tip, show_chip
 from messages.i18n import gettext
 
 _NAMES_WIDTH = 124
@@ -92,7 +92,7 @@ class ImportFields(QWidget):
         self._fold.setProperty("role", "fold")
         self._fold.setText(gettext("More"))
         self._fold.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
-        self._fold.setToolTip(gettext("Lines, part, conditions, uncertainty and name"))
+        set_tool_tip(self._fold, gettext("Lines, part, conditions, uncertainty and name"))
         column.addWidget(self._fold)
         self._add_groups(make_column(spacing=12, of=self._rare), import_form.RARE_GROUPS)
         column.addWidget(self._rare)

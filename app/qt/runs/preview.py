@@ -12,7 +12,7 @@ from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plot_marks import pen
 from app.qt.widgets.plot_view import X
 from app.qt.widgets.plots import PlotStack, value_at
-from app.qt.widgets.text import label
+from app.qt.widgets.text import label, markup
 from messages.i18n import N_, gettext, ngettext
 
 _TITLES = (
@@ -103,19 +103,21 @@ class RunsPreview(QWidget):
             for number, curve in enumerate(self._curves[row]):
                 token = channel if is_single else tokens.overlay[number]
                 curve.setPen(pen(token, dashes=() if is_single else _DASHES[number % len(_DASHES)]))
-        self._names.setText(self._legend())
+        self._show_legend()
 
-    def _legend(self) -> str:
+    def _show_legend(self) -> None:
         tokens = self._theme.tokens
         traces = self._overlay.traces
         if len(traces) == 1:
-            return traces[0].name
+            self._names.setText(traces[0].name)
+            return
         marks = ("———", "−\u00a0−\u00a0−", "·\u00a0·\u00a0·")  # lines break after dashes, not minuses
-        return "&nbsp;&nbsp; ".join(
+        names = (
             f'<span style="color: {colour(tokens.overlay[number]).name()}">'
-            f"{marks[number % len(marks)]}\u00a0{trace.name}</span>"
+            f"{marks[number % len(marks)]}\u00a0{markup(trace.name)}</span>"
             for number, trace in enumerate(traces)
         )
+        self._names.set_rich_text("&nbsp;&nbsp; ".join(names))
 
     def _show_values(self, at_s: float) -> None:
         for row in range(len(_TITLES)):

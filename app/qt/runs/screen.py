@@ -17,7 +17,7 @@ from app.qt.widgets.folder_button import FolderButton
 from app.qt.widgets.inputs import ComboBox, ask, make_button, make_choice
 from app.qt.widgets.layouts import make_column, make_frame, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
-from app.qt.widgets.text import label
+from app.qt.widgets.text import label, set_tool_tip
 from app.runs.exchange.formats import SUFFIXES
 from messages.i18n import N_, gettext, ngettext
 
@@ -145,7 +145,7 @@ class RunsScreen(QWidget):
             count = gettext("{shown} of {total}", shown=len(state.rows), total=count)
         self._count.setText(count if state.is_listed else "")
         hint = gettext("{folder}\nShow the runs of another folder (Ctrl+L)", folder=state.folder)
-        self._folder.setToolTip(hint)
+        set_tool_tip(self._folder, hint)
         self._folder.folder = state.folder
         self._empty.setText(_empty_text(state))
         was_empty = self._middle.currentIndex() == 1

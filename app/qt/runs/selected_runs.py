@@ -12,7 +12,7 @@ from app.presenters.runs.state import METADATA_FIELDS, MetadataForm, RunsState
 from app.qt.widgets.inputs import ProgressBar, make_button
 from app.qt.widgets.layouts import make_column, make_form_grid, make_row
 from app.qt.widgets.shortcuts import add_shortcut, bind_button, set_button_hint
-from app.qt.widgets.text import label, show_chip
+from app.qt.widgets.text import label, set_tool_tip, show_chip
 from messages.i18n import gettext
 
 
@@ -31,14 +31,14 @@ class ActionBar(QFrame):
         self._trash = _button(gettext("Trash"), presenter.trash)
         self._restore = _button(gettext("Restore"), presenter.restore)
         self._empty = _button(gettext("Empty trash…"), empty_trash)
-        self._empty.setToolTip(gettext("Delete all runs in the trash for ever"))
+        set_tool_tip(self._empty, gettext("Delete all runs in the trash for ever"))
         self._undo = _button(gettext("Undo"), presenter.undo)
         self._message = label(wrap=True)
         self._details = _button(gettext("Details"), self._fold)
         self._bar = ProgressBar()
         self._bar.setFixedWidth(160)
         self._cancel = _button(gettext("Cancel"), presenter.cancel)
-        self._cancel.setToolTip(gettext("Give up the work; what is done stays"))
+        set_tool_tip(self._cancel, gettext("Give up the work; what is done stays"))
         self._list = label(wrap=True)
         self._lay_out()
 
@@ -118,7 +118,7 @@ class MetadataEditor(QWidget):
         grid.setContentsMargins(12, 4, 12, 12)
         self.setLayout(grid)
         for name, field in self._fields.items():
-            field.setToolTip(gettext(METADATA_FIELDS[name].hint))
+            set_tool_tip(field, gettext(METADATA_FIELDS[name].hint))
             field.editingFinished.connect(lambda name=name: self._on_edited(name))
 
     def show_metadata(self, metadata: MetadataForm | None) -> None:

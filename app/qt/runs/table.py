@@ -25,6 +25,7 @@ from app.presenters.base import Tone
 from app.presenters.runs.state import COLUMN_HINTS, USUAL_COLUMNS, Column, RunRow
 from app.qt.theme import Theme
 from app.qt.widgets.tables import COPIED_ROLE, NAME_ROLE, TitleHeader, serve_table
+from app.qt.widgets.text import tool_tip
 from app.qt.window_geometry import persist_layout
 from messages.i18n import gettext
 
@@ -176,7 +177,7 @@ class _Model(QAbstractTableModel):
             case Qt.ItemDataRole.DisplayRole:
                 return text
             case Qt.ItemDataRole.ToolTipRole:
-                return _hint(row, column) or text
+                return tool_tip(_hint(row, column) or text)
             case _ if role == COPIED_ROLE and column in _MEASURED:
                 result = row.results.get(column)
                 return ("", "") if result is None else (result.value, result.uncertainty)

@@ -7,6 +7,7 @@ from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QMenu, QPushButton
 
 from app.qt.widgets.inputs import ask_for_folder
+from app.qt.widgets.text import set_tool_tip
 from messages.i18n import gettext
 
 
@@ -55,5 +56,5 @@ class OpenFolderButton(QPushButton):
 
     def show_folder(self, folder: str) -> None:
         self._folder = folder
-        self.setToolTip(folder)
+        set_tool_tip(self, folder)
         self.setVisible(bool(folder))

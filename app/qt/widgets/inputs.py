@@ -21,6 +21,7 @@ from PySide6.QtWidgets import (
 
 from app.presenters.base import Progress
 from app.qt.theme import set_property
+from app.qt.widgets.text import set_tool_tip
 from messages.i18n import gettext
 
 _MARK = ((0.22, 0.52), (0.42, 0.72), (0.78, 0.30))  # corners of the mark, in parts of the box
@@ -78,7 +79,7 @@ def make_button(
     text: str, act: Callable[[], object], hint: str = "", *, large: bool = False, primary: bool = False
 ) -> QPushButton:
     button = QPushButton(text)
-    button.setToolTip(hint)
+    set_tool_tip(button, hint)
     if large:
         button.setProperty("scale", "large")
     if primary:
@@ -124,6 +125,7 @@ def ask_for_folder(parent: QWidget, title: str, start: str, choose: Callable[[st
 def ask(parent: QWidget, text: str, detail: str, action: str, act: Callable[[], object]) -> None:
     """Ask before `act`, whose button is `action`; Cancel is the default, and nothing waits for the answer."""
     box = QMessageBox(QMessageBox.Icon.Warning, "Slipstand", text, parent=parent)
+    box.setTextFormat(Qt.TextFormat.PlainText)
     box.setInformativeText(detail)
     box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     box.addButton(action, QMessageBox.ButtonRole.AcceptRole).clicked.connect(lambda _checked: act())

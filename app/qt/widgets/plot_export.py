@@ -103,5 +103,6 @@ def _save(parent: QWidget, path: str, content: Callable[[], bytes]) -> None:
 
 def _tell(parent: QWidget, text: str) -> None:
     box = QMessageBox(QMessageBox.Icon.Warning, gettext("Save"), text, parent=parent)
+    box.setTextFormat(Qt.TextFormat.PlainText)
     box.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
     box.open()

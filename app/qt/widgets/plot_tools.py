@@ -16,6 +16,7 @@ from app.qt.widgets.icons import icon
 from app.qt.widgets.layouts import make_row
 from app.qt.widgets.plot_view import PAN, STEP, X, Y
 from app.qt.widgets.shortcuts import describe_shortcut
+from app.qt.widgets.text import set_tool_tip
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
@@ -212,7 +213,7 @@ def _button(tool: Tool) -> QToolButton:
     button.setProperty("role", "plot-tool")
     button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
     button.setIconSize(QSize(16, 16))
-    button.setToolTip(tool.hint)
+    set_tool_tip(button, tool.hint)
     button.setAccessibleName(tool.text)
     button.clicked.connect(lambda _checked: tool.act())
     return button

@@ -27,7 +27,7 @@ from app.qt.widgets.plot_curves import Curve, Line, Points
 from app.qt.widgets.plot_marks import Crosshair, Grid
 from app.qt.widgets.plot_tools import PlotTools
 from app.qt.widgets.plot_view import PlotView, X, Y
-from app.qt.widgets.text import plain_text
+from app.qt.widgets.text import markup, plain_text
 
 Floats = NDArray[np.float64]
 AXIS_WIDTH = 52
@@ -378,7 +378,7 @@ def value_extent(*lines: Floats) -> tuple[float, float]:
 
 def _write(item: Any, text: str, text_colour: str) -> None:
     """Set the text of a label; a wide one is cut instead of moving the plot."""
-    styled = f'<span style="color: {text_colour}; font-size: 12px">{text}</span>'
+    styled = f'<span style="color: {text_colour}; font-size: 12px">{markup(text)}</span>'
     if styled != item.text:  # to lay a text out takes as long as to draw a curve
         item.setText(styled)
         item.setMinimumWidth(0.0)

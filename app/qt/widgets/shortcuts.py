@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QAbstractButton, QDialog, QGridLayout, QPushButton
 
 from app.qt.theme import TextRole
 from app.qt.widgets.layouts import STRETCH, make_column, make_row, make_scroll_area
-from app.qt.widgets.text import label
+from app.qt.widgets.text import label, set_tool_tip
 from messages.i18n import gettext
 
 ENTER_KEYS = ("Return", "Enter")
@@ -59,7 +59,7 @@ def bind_button(
 def set_button_hint(button: QAbstractButton, words: str) -> None:
     """Set the description in the tool tip of a button; its key stays in it."""
     key = button.property(_SHOWN)
-    button.setToolTip(f"{words} ({key})" if key else words)
+    set_tool_tip(button, f"{words} ({key})" if key else words)
 
 
 def describe_shortcut(widget: QWidget, key: str, words: str) -> None:

@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QHeaderView, QMenu, QStyle, QStyleOptionHeader, QT
 
 from analysis.formatting import MINUS, THIN_SPACE
 from app.qt.widgets.shortcuts import add_shortcut
-from app.qt.widgets.text import set_subscripts
+from app.qt.widgets.text import set_subscripts, set_tool_tip
 from messages.i18n import gettext
 
 NAME_ROLE = Qt.ItemDataRole.UserRole + 10
@@ -75,7 +75,7 @@ def serve_table(
             lambda at, area=area: _open_menu(table, columns, changed, area.mapToGlobal(at))
         )
     header.setSectionsMovable(True)
-    header.setToolTip(gettext("Drag a title to move its column; a right click chooses columns"))
+    set_tool_tip(header, gettext("Drag a title to move its column; a right click chooses columns"))
     copy = gettext("Copy the selected rows with their titles, for a spreadsheet")
     add_shortcut(table, "Ctrl+C", copy, partial(copy_rows, table), focused=True)
     if columns:

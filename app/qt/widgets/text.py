@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QResizeEvent, QTextDocumentFragment
+from PySide6.QtGui import QAction, QResizeEvent, QTextDocumentFragment
 from PySide6.QtWidgets import (
     QBoxLayout,
     QGridLayout,
     QHBoxLayout,
     QLabel,
     QSizePolicy,
+    QTableWidgetItem,
     QVBoxLayout,
     QWidget,
 )
@@ -20,6 +21,7 @@ from PySide6.QtWidgets import (
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Tone
 from app.presenters.results import ResultRow
 from app.qt.theme import TextRole, font, set_property
+from messages.control_characters import show_control_characters
 from messages.i18n import gettext
 
 _Value = TypeVar("_Value")
@@ -27,7 +29,55 @@ _Fill = TypeVar("_Fill")
 _NUMBER_GAP = 8  # pixels between a number and its uncertainty
 _SLACK = 0.97  # figures grow in whole pixels: not quite in proportion to their font
 _SYMBOL = re.compile(r"\b([fuva])_(d|s|max)\b")
-_MARKUP = re.compile(r"</?\w+>|&\w+;")
+_MARKUP = re.compile("<sub>|&nbsp;")
+_ESCAPED_MARKUP = re.compile("&lt;/?sub&gt;|&amp;nbsp;")
+
+
+class Label(QLabel):
+    """Shows text as it is: of markup in it only subscripts are obeyed, and control characters are visible."""
+
+    def __init__(self, text: str = "", parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._text = ""
+        self.setText(text)
+
+    def text(self) -> str:
+        """Return the text as it was set."""
+        return self._text
+
+    def setText(self, text: str) -> None:  # noqa: N802
+        self._text = text
+        is_rich = _MARKUP.search(text) is not None
+        self.setTextFormat(Qt.TextFormat.RichText if is_rich else Qt.TextFormat.PlainText)
+        super().setText(markup(text) if is_rich else show_control_characters(text))
+
+    def set_rich_text(self, rich: str) -> None:
+        """Show HTML; what is foreign in it must be escaped."""
+        self._text = rich
+        self.setTextFormat(Qt.TextFormat.RichText)
+        super().setText(rich)
+
+
+def markup(text: str) -> str:
+    """HTML that shows a text as it is; of markup in it only subscripts and hard spaces are obeyed."""
+    escaped = html.escape(show_control_characters(text), quote=False).replace("\n", "<br>")
+    return _ESCAPED_MARKUP.sub(lambda found: html.unescape(found[0]), escaped)
+
+
+def set_tool_tip(target: QWidget | QTableWidgetItem | QAction, text: str) -> None:
+    """Show a text as it is while the mouse rests on something."""
+    target.setToolTip(tool_tip(text))
+
+
+def tool_tip(text: str) -> str:
+    """Text of a tool tip, which Qt takes for HTML where it looks like that."""
+    is_rich = "<" in text or "&" in text
+    return f"<span>{markup(text)}</span>" if is_rich else show_control_characters(text)
+
+
+def button_text(name: str) -> str:
+    """Text of a button or an action: an ampersand is none that marks a key."""
+    return show_control_characters(name).replace("&", "&&")
 
 
 def label(
@@ -37,9 +87,9 @@ def label(
     muted: bool = False,
     wrap: bool = False,
     parent: QWidget | None = None,
-) -> QLabel:
+) -> Label:
     """Text of a role, its symbols set; wrapped text may be selected with the mouse."""
-    made = QLabel(set_subscripts(text), parent)
+    made = Label(set_subscripts(text), parent)
     made.setFont(font(role))
     made.setWordWrap(wrap)
     if wrap:
@@ -53,7 +103,7 @@ def show_chip(target: QLabel, chip: Chip) -> None:
     """Write a chip into a label; an empty one hides it. The mark before the word tells the tone by shape."""
     mark = {"ok": "✓ ", "warn": "▲ ", "bad": "■ "}.get(chip.tone.value, "")
     target.setText(set_subscripts(mark + chip.text) if chip.text else "")
-    target.setToolTip(chip.hint)
+    set_tool_tip(target, chip.hint)
     _set_shown(target, bool(chip.text))
     set_property(target, "tone", chip.tone.value)
 
@@ -80,16 +130,13 @@ def padded(values: Sequence[_Value], count: int, fill: _Fill) -> list[_Value | _
 
 
 def set_subscripts(text: str) -> str:
-    """Set the symbols in sentences of the analysis: f_d with a subscript. Without any, the text as it is."""
-    if not _SYMBOL.search(text):
-        return text
-    rich = text if _MARKUP.search(text) else html.escape(text, quote=False)
-    return _SYMBOL.sub(r"\1<sub>\2</sub>", rich)
+    """Set the symbols in sentences of the analysis: f_d with a subscript."""
+    return _SYMBOL.sub(r"\1<sub>\2</sub>", text)
 
 
 def plain_text(rich: str) -> str:
     """What a screen reader says of rich text: a subscript without its tags."""
-    return QTextDocumentFragment.fromHtml(rich).toPlainText()
+    return QTextDocumentFragment.fromHtml(markup(rich)).toPlainText()
 
 
 def symbol_text(rich: str) -> str:
@@ -102,18 +149,18 @@ def break_path(path: str) -> str:
     return path.replace("/", "/\u200b").replace("\\", "\\\u200b")
 
 
-class ElidedLabel(QLabel):
+class ElidedLabel(Label):
     """Muted line that is elided where it does not fit; the tool tip holds the whole text."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._text = ""
+        self._line = ""
         self.setFont(font(TextRole.TEXT))
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
 
     def set_line(self, text: str, *, is_error: bool = False) -> None:
-        self._text = text
-        self.setToolTip(text)
+        self._line = text
+        set_tool_tip(self, text)
         set_property(self, "tone", "bad" if is_error else "plain")
         set_property(self, "role", "" if is_error else "muted")
         self._fit()
@@ -123,7 +170,7 @@ class ElidedLabel(QLabel):
         self._fit()
 
     def _fit(self) -> None:
-        self.setText(self.fontMetrics().elidedText(self._text, Qt.TextElideMode.ElideRight, self.width()))
+        self.setText(self.fontMetrics().elidedText(self._line, Qt.TextElideMode.ElideRight, self.width()))
 
 
 class ValueLabel(QWidget):

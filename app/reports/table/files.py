@@ -115,7 +115,7 @@ def _markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> lis
 
 
 def _marked(text: str) -> str:
-    return "".join(f"\\{one}" if one in "\\`*_[]<>|#" else " " if one in "\r\n" else one for one in text)
+    return "".join(f"\\{one}" if one in "\\`*_[]<>|#&" else " " if one in "\r\n" else one for one in text)
 
 
 def _latex(content: TableContent) -> str:

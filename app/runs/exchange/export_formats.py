@@ -312,7 +312,7 @@ def _latex_lines(exported: ExportedRun) -> Iterator[str]:
         cells = cells.replace(" & ", rf" \textbf{{{SIMULATED}}} & ", 1)
     yield cells + r" \\"
     if origin is not None:
-        yield from (f"% {name}: {text}" for name, text in origin_rows(origin))
+        yield from (f"% {name}: {' '.join(text.split())}" for name, text in origin_rows(origin))
 
 
 def escape_latex(text: str) -> str:

@@ -10,7 +10,7 @@ from analysis.record import AnalysisError
 from app.runs.analysis_input import to_record
 from app.runs.analysis_request import AnalysisRequest
 from app.runs.analyze import analyze_run
-from app.runs.disk import atomic_write
+from app.runs.disk import atomic_write, make_folder
 from app.runs.errors import RunError, UnsuitableRunError
 from app.runs.exchange.content import ExportedRun, sample_columns
 from app.runs.exchange.export_formats import (
@@ -168,7 +168,7 @@ def _targets(paths: Sequence[Path], output: Path, request: ExportRequest) -> lis
     if output.exists() and not output.is_dir():
         template = N_("{output} is a file, but {count} runs need a folder. Choose another {option}")
         raise UnsuitableRunError(template, option=option("-o"), output=output, count=len(paths))
-    output.mkdir(parents=True, exist_ok=True)
+    make_folder(output)
     return [output / (name + request.writer.suffix) for name in unique_names(path.stem for path in paths)]
 
 

@@ -134,7 +134,8 @@ class FrameDecoder(PacketDecoder):
     between can have held are damaged, the others missing. A sequence that goes back, leaps by more than
     `max_gap_s`, or contradicts the host's clock after a broken connection is a restart of the device: the
     rows until it are estimated from the host's clock (`missing_estimated`), and the index goes on. A frame
-    that comes twice counts once. Losses before the first and after the last good frame cannot be known.
+    that comes twice counts once, and one that comes late not at all. Losses before the first and after the
+    last good frame cannot be known.
     """
 
     _piece_bytes = 1 << 18
@@ -190,6 +191,9 @@ _OVERLOADS = int(FrameFlags.OVERLOAD_TABLE | FrameFlags.OVERLOAD_RELATIVE)
 _OVERLOAD_SHIFT = 2
 """Shifts the overload bits of the frame onto those of `SampleStatus`."""
 
+_LATE_S = 0.25  # a device that restarts is away for longer
+_LATE_TOLERANCE_S = 0.01
+
 STATE = state_type("max_gap next_seq last_seq last_t_us packet_us garbage", "")
 """What the decoder keeps between calls: the longest step of the sequence that is no restart; the sequence
 number that follows without a loss; sequence, time and unwrapped time (us) of the last frame; bytes since."""
@@ -240,8 +244,7 @@ def count_frames(
     for frame in frames:
         _discard(state, frame.start - end)
         end = frame.end
-        is_again = frame.seq == state.last_seq and frame.t_us == state.last_t_us
-        if is_again and state.started and not state.restarting:
+        if state.started and not state.restarting and _is_late(state, frame):
             state.repeated += 1
             state.discarded_bytes += end - frame.start
             continue
@@ -273,6 +276,15 @@ def count_frames(
 def _discard(state: Record, size: int) -> None:
     state.garbage += size
     state.discarded_bytes += size
+
+
+@inlined
+def _is_late(state: Record, frame: Record) -> bool:
+    """Tell whether a frame came before, or after ones that were sent later: its rows are counted by then."""
+    behind_s = ((state.last_seq - frame.seq) & _U32) * state.period_s
+    behind_by_time_s = ((state.last_t_us - frame.t_us) & _U32) * 1e-6
+    is_late: bool = behind_s <= _LATE_S and abs(behind_by_time_s - behind_s) <= _LATE_TOLERANCE_S
+    return is_late
 
 
 @inlined

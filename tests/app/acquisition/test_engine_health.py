@@ -25,6 +25,9 @@ class Owner:
         self.health: list[Health] = []
         self._commands = [Quit()]
 
+    def wait(self, timeout_s: float) -> None:
+        """A command is there at once."""
+
     def take(self, timeout_s: float = 0.0):
         return self._commands.pop() if len(self.health) >= 3 and self._commands else None
 

@@ -51,6 +51,9 @@ class Owner:
         self._reads = 0
         self.ended: RunEnded | None = None
 
+    def wait(self, timeout_s: float) -> None:
+        """A command is there at once."""
+
     def take(self, timeout_s: float = 0.0):
         if self._commands:
             return self._commands.pop()

@@ -180,7 +180,7 @@ def append_often(journal, times):
 
 def test_a_disk_that_is_too_slow_is_said(monkeypatch):
     monkeypatch.setattr(Journal, "_QUEUE_RECORDS", 4)
-    monkeypatch.setattr(Journal, "_write", lambda _: None)
+    monkeypatch.setattr(Journal, "_write", lambda *_: None)
     journal = Journal(Disk(0))
     with pytest.raises(JournalError, match="too slow"):
         append_often(journal, 5)

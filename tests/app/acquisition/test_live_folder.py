@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from app.acquisition import ring
 from app.acquisition.ring import live_folder
 from app.runs.lock import FileLock
 
@@ -16,7 +17,23 @@ from app.runs.lock import FileLock
 @pytest.fixture(autouse=True)
 def temporary(tmp_path, monkeypatch):
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(ring, "MEMORY_FOLDER", tmp_path / "absent")
     return tmp_path
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no folder in memory")
+@pytest.mark.parametrize("is_full", [False, True])
+def test_it_is_in_memory_where_there_is_room(temporary, monkeypatch, is_full):
+    memory = temporary / "memory"
+    memory.mkdir()
+    monkeypatch.setattr(ring, "MEMORY_FOLDER", memory)
+    if is_full:
+        monkeypatch.setattr(ring, "_MEMORY_BYTES", 1 << 62)
+    left_by_a_killed_engine(temporary, "before")
+    with live_folder() as folder:
+        assert folder.parent == (temporary if is_full else memory)
+    assert [path.name for path in temporary.iterdir()] == ["memory"]
+    assert list(memory.iterdir()) == []
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has access lists")

@@ -73,6 +73,9 @@ class Owner:
         self.blocks = {}
         self.events = []
 
+    def wait(self, timeout_s: float) -> None:
+        """A command is there at once."""
+
     def take(self, timeout_s: float = 0.0):
         if self._arm:
             arm, self._arm = self._arm, None

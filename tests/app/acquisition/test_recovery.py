@@ -332,6 +332,8 @@ def test_a_journal_without_bytes_goes_and_one_of_rubbish_stays(tmp_path, writer)
     header = desk.journal.read_bytes()
     assert recover_journal(desk.journal).state is RecoveryState.EMPTY
     assert list(tmp_path.iterdir()) == []
+    desk.journal.write_bytes(header + encode_record(b"one", 5)[:-1])
+    assert recover_journal(desk.journal).state is RecoveryState.EMPTY, "a power cut tore the first record"
     desk.journal.write_bytes(header + encode_record(b"rubbish" * 100, 5))
     with pytest.raises(RecoveryError, match="no sample"):
         recover_journal(desk.journal)

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from app.cli.doctor import FindingState, folders, installation, ports
+from app.cli.doctor import FindingState, compilation, folders, installation, ports
 from app.cli.doctor.folders import check_calibration, check_synchronised
 from app.runs.errors import DiskFullError
 from app.runs.journal import MAGIC, SUFFIX
@@ -296,6 +296,15 @@ def test_where_compiled_code_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert installation.check_compiled_code(tmp_path).state is FindingState.WARN
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     assert "minutes" in installation.check_compiled_code(tmp_path).message
+
+
+def test_code_is_compiled_before_anything_is_checked(slipstand: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(compilation, "compile_all", lambda: done.append("compiled"))
+    slipstand("doctor", "--json")
+    assert done == []
+    slipstand("doctor", "--compile", "--json")
+    assert done == ["compiled"]
 
 
 def test_a_bundle_holds_what_a_bug_report_needs_and_says_so(

@@ -3,6 +3,8 @@
 import csv
 import errno
 import json
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -213,3 +215,17 @@ def test_a_stand_that_is_not_ideal_is_stored_with_its_truth(slipstand: Any, tmp_
 )
 def test_an_effect_that_cannot_be_is_refused(slipstand: Any, given: Any, said: str) -> None:
     assert_one_error_line(slipstand("simulate", "--series", "1FFM0", *given), said)
+
+
+@pytest.mark.parametrize("more", [[], ["--static-friction", "0.2", "--tilt", "0.01"]])
+def test_a_brief_one_is_the_same_without_compiled_code(slipstand: Any, more: list[str]) -> None:
+    """What it prints is that of compiled code, to the last digit, and numba is not even imported."""
+    arguments = ["simulate", "--series", "1FFM0", "--friction", "0.12", *more, "--json"]
+    code = (
+        "import sys; from app.__main__ import main\ntry: main()\n"
+        "finally: print('numba' in sys.modules, file=sys.stderr)"
+    )
+    command = [sys.executable, "-c", code, *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr.split() == ["False"]
+    assert json.loads(done.stdout) == slipstand(*arguments).json

@@ -38,7 +38,7 @@ NOWHERE = {"QT_QPA_PLATFORM": None, "DISPLAY": None, "WAYLAND_DISPLAY": None}
 REFUSED = """
 import sys
 from PySide6.QtWidgets import QMessageBox
-QMessageBox.critical = lambda *words: sys.stdout.write(words[-1])
+QMessageBox.exec = lambda box: sys.stdout.write(box.text())
 from app.qt.main import run_window
 sys.exit(run_window())
 """

@@ -43,7 +43,7 @@ def test_what_a_killed_process_was_making_is_removed(tmp_path, metadata):
     command = (
         "import os, sys, msgspec; from pathlib import Path; from app.runs import creation;"
         " from app.runs.metadata import RunMetadata; from app.runs.writer import create_run;"
-        " creation._give_name = lambda *_: os._exit(7);"
+        " creation.give_new_name = lambda *_: os._exit(7);"
         " create_run(Path(sys.argv[1]), msgspec.json.decode(sys.stdin.buffer.read(), type=RunMetadata))"
     )
     killed = subprocess.run(

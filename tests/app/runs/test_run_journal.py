@@ -1,6 +1,6 @@
 import pytest
 
-from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
+from app.runs.journal import MAGIC, RecordKind, encode_record, has_record_behind, read_journal
 
 
 def test_a_journal_reads_back_up_to_its_first_torn_record(tmp_path):
@@ -39,3 +39,15 @@ def test_another_file_is_no_journal(tmp_path):
     (tmp_path / "a").write_bytes(b"time,table\n1,2\n")
     with pytest.raises(ValueError, match="not a Slipstand journal"):
         list(read_journal(tmp_path / "a"))
+
+
+def test_a_whole_record_behind_a_torn_one_is_seen(tmp_path):
+    path, torn = tmp_path / "a.journal", encode_record(b"one", 1)[:-1]
+    path.write_bytes(MAGIC + torn)
+    assert not has_record_behind(path, len(MAGIC))
+    path.write_bytes(MAGIC + bytes(5000))
+    assert not has_record_behind(path, len(MAGIC))
+    path.write_bytes(MAGIC + torn + bytes(500) + encode_record(b"two", 2))
+    assert has_record_behind(path, len(MAGIC))
+    path.write_bytes(MAGIC + bytes(2 << 20))
+    assert has_record_behind(path, len(MAGIC)), "so much is searched by nobody, and stays"

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from app.runs.disk import sync_folder
+from config.durable_files import sync_folder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows syncs no folders")
 

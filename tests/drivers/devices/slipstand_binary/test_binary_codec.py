@@ -308,6 +308,16 @@ def test_the_same_frame_twice_counts_once():
     assert decoder.losses == Losses(samples=8, repeated=1, discarded_bytes=31)
 
 
+def test_a_frame_that_comes_late_gives_no_row_in_a_wrong_place():
+    frames = stream(6)
+    block, decoder = decode([b"".join([frames[0], frames[3], frames[1], frames[2], frames[4], frames[5]])])
+    sent = readings(12)
+    good = (block.status & SampleStatus.MISSING) == 0
+    assert good.tolist() == [True, True, *[False] * 4, *[True] * 6]
+    np.testing.assert_array_equal(block.counts[good], sent[good])
+    assert (decoder.losses.repeated, decoder.losses.missing, decoder.losses.restarts) == (2, 4, 0)
+
+
 def test_a_drop_that_the_device_tells_agrees_with_its_gap():
     dropped = FrameFlags.DROPPED_BEFORE
     frames = [encode_frame(0, 0, readings(2), dropped), encode_frame(6, 0, readings(2), dropped)]
