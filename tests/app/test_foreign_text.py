@@ -164,7 +164,8 @@ def test_a_report_is_typeset_as_text(poison):
     poison = POISONS[poison]
     blocks = [Text(poison), Points([poison]), Facts([(poison, poison)]), Notice(poison)]
     grid = Grid([poison], [[poison]])
-    report = Report(poison, poison, poison, "2026-11-24", poison, [Section(poison, [*blocks, grid])])
+    sections = [Section(poison, [*blocks, grid])]
+    report = Report(poison, poison, [(poison, poison)], None, poison, "2026-11-24", poison, sections)
     assert render_pdf(report).startswith(b"%PDF")
 
 

@@ -122,25 +122,28 @@ def test_the_last_column_stays(table: QTableWidget) -> None:
     assert not next(action for action in menu.actions() if action.text() == "Copy rows").isEnabled()
 
 
-def test_symbols_of_titles_have_their_subscripts(theme: Theme, table: QTableWidget) -> None:
-    """The letters behind the mark of a subscript are drawn smaller and lower: the title is narrower."""
-    header = TitleHeader(table)
-    table.setHorizontalHeader(header)
-    table.setColumnWidth(1, 120)
+def test_symbols_of_titles_have_their_subscripts(theme: Theme, qtbot: QtBot) -> None:
+    """The index of `f_d` is drawn below the line, that of `fd` on it."""
+    table = QTableWidget(1, 2)
+    qtbot.addWidget(table)
+    table.setHorizontalHeaderLabels(["Run", "f_d"])
+    table.setHorizontalHeader(TitleHeader(table))
+    table.horizontalHeader().setDefaultAlignment(Qt.AlignmentFlag.AlignLeft)
     table.show()
-    symbol = inked_width(header)
-    table.horizontalHeaderItem(1).setText("fd")
-    assert symbol != inked_width(header)
+    qtbot.waitExposed(table)
+    assert height_of_title(table, "f_d") > height_of_title(table, "fd") > 0
 
 
-def inked_width(header: TitleHeader) -> int:
-    """Width of what is written in the second title."""
+def height_of_title(table: QTableWidget, title: str) -> int:
+    """Height of what is written in the second title."""
+    header = table.horizontalHeader()
+    table.horizontalHeaderItem(1).setText(title)
     QApplication.processEvents()
-    start = header.sectionViewportPosition(1)
-    image = header.grab(QRect(start + 1, 1, header.sectionSize(1) - 2, header.height() - 3)).toImage()
-    ground, rows = image.pixel(0, 0), range(4, image.height() - 8)  # not the line below the titles
-    columns = [x for x in range(image.width()) if any(image.pixel(x, y) != ground for y in rows)]
-    return columns[-1] - columns[0]
+    place = QRect(header.sectionViewportPosition(1) + 2, 0, 40, header.height() - 4)  # without the line below
+    image = header.grab(place).toImage()
+    ground, columns = image.pixel(0, 0), range(image.width())
+    rows = [y for y in range(image.height()) if any(image.pixel(x, y) != ground for x in columns)]
+    return rows[-1] - rows[0] + 1
 
 
 def test_a_title_is_dragged_to_another_place(table: QTableWidget, qtbot: QtBot) -> None:
