@@ -144,10 +144,11 @@ def _spread_out(x: float, count: int) -> Floats:
 
 
 def _tick_text(bars: ContactBars, *, has_room: bool) -> str:
-    text = f"{bars.contact}: {bars.name}" if bars.name and has_room else bars.contact
-    return "\n".join(
-        filter(None, (text, bars.ratio and gettext("static / dynamic = {ratio}", ratio=bars.ratio)))
-    )
+    """Contact and ratio of its frictions; their names only where the next contact leaves room."""
+    if not has_room:
+        return f"{bars.contact}\n{bars.ratio}"
+    text = f"{bars.contact}: {bars.name}" if bars.name else bars.contact
+    return f"{text}\n{gettext('static / dynamic = {ratio}', ratio=bars.ratio)}" if bars.ratio else text
 
 
 def _accessible_text(bars: ContactBars) -> str:
