@@ -170,7 +170,9 @@ class Engine:
     def _latency(self) -> Latency:
         if self._stream.is_disconnected:
             return Latency.INTERACTIVE
-        return Latency.BATCHED if self._recording is None else self._recording.latency
+        latency = Latency.BATCHED if self._recording is None else self._recording.latency
+        is_pair = bool(self._port.relative_url)  # one of two devices that comes back is joined to the other
+        return Latency.IDENTIFIED if is_pair and latency is Latency.BATCHED else latency
 
     def _take_reads(self) -> None:
         reads, wait_s = list[live_stream.DecodedRead](), _WAIT_S
