@@ -183,7 +183,7 @@ def report(operator: Operator, kept: Path) -> None:
 
 
 def set_up(operator: Operator) -> None:
-    """Change the mass of the plate, and dismiss the notice that says what to do about it."""
+    """Change the mass of the plate, and dismiss the notice that says what to do about it, and all others."""
     operator.window.activateWindow()
     operator.wait(operator.window.isActiveWindow)
     operator.press(Qt.Key.Key_Comma, CONTROL)
@@ -196,6 +196,8 @@ def set_up(operator: Operator) -> None:
     operator.press(Qt.Key.Key_S, CONTROL)
     assert load_stand().plate_mass_kg == 22.5
     operator.leave_dialog()
-    operator.tab_to("Dismiss")
-    operator.press(Qt.Key.Key_Return)
+    notices = 1 + operator.presenter.state.more_notices  # on a busy computer the quick stand is told of, too
+    for _ in range(notices):
+        operator.tab_to("Dismiss")
+        operator.press(Qt.Key.Key_Return)
     assert operator.presenter.state.notice is None
