@@ -221,6 +221,9 @@ class ValueLabel(QWidget):
         is_wide = sum(widths) + _NUMBER_GAP * (len(widths) - 1) > self.width()
         ways = QBoxLayout.Direction
         self._numbers.setDirection(ways.TopToBottom if is_wide else ways.LeftToRight)
+        heights = [part.sizeHint().height() for part in shown] or [0]
+        names = self._name.sizeHint().height() if self._named else 0
+        self.setMinimumHeight(names + (sum(heights) if is_wide else max(heights)))  # a low card scrolls
         widest = max(widths, default=0)
         if widest > self.width() > 0:
             self._scale_fonts(_SLACK * self.width() / widest)

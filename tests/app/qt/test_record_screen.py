@@ -18,6 +18,7 @@ from app.presenters.record.presenter import RecordPresenter
 from app.presenters.record.state import Action, AnalysisFailed, Connecting
 from app.qt.record.screen import RecordScreen
 from app.qt.theme import Theme
+from app.qt.widgets.text import ValueLabel
 
 LIVE = LiveResult(
     9.0,
@@ -337,6 +338,21 @@ def test_the_result_is_zoomed_into_long_after_the_run(stage: Stage) -> None:
     hand.drag(hand.place(0.5, 0.5), hand.place(0.4, 0.5), Qt.MouseButton.MiddleButton)
     QApplication.processEvents()
     assert stage.presenter.state.traces.table.time_s[-1] > line.time_s[-1]
+
+
+def test_the_main_result_is_whole_in_a_window_that_is_made_smaller(stage: Stage) -> None:
+    stage.screen.resize(1190, 760)
+    tail(stage)
+    stage.play(10.0, END_S + 0.1)
+    stage.presenter.dispatch(analysed())
+    QApplication.processEvents()
+    stage.screen.resize(934, 640)
+    for _ in range(3):
+        QApplication.processEvents()
+    shown = [value for value in stage.screen.findChildren(ValueLabel) if value.isVisible()]
+    assert shown
+    assert all(value.height() >= value.minimumHeight() > 20 for value in shown)
+    assert clipped_words(stage.screen) == []
 
 
 @pytest.mark.parametrize("language", ["en", "ru"])
