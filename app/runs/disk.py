@@ -46,9 +46,7 @@ def reserve_space(path: Path, size: int, more: int) -> None:
     """
     try:
         if sys.platform == "linux":
-            handle = os.open(
-                path, os.O_RDWR
-            )  # as read by the C library where the file system reserves nothing
+            handle = os.open(path, os.O_RDWR)  # read by the C library where the file system reserves nothing
             try:
                 os.posix_fallocate(handle, size, more)
             finally:

@@ -40,8 +40,8 @@ _BUTTONS = {
 _FOLD = N_("Operator, conditions, runs in a row, note")
 _DISARM = (N_("Disarm"), N_("End without a run: the table has not been pulled back"))
 _STRIP_SPACING = 4
-_COUNT = "1"
-"""Runs in a row where nothing is written."""
+_DEFAULTS = {"count": "1"}
+"""Values of fields that are left empty; the other fields show an example or a hint."""
 _FORM_FIELDS = {
     "operator": (N_("Operator"), N_("name")),
     "temperature_c": (CONDITION_TITLES["temperature_c"], N_("for example 21.5")),
@@ -50,7 +50,7 @@ _FORM_FIELDS = {
     "contact_id": (CONDITION_TITLES["contact_id"], N_("which pair of surfaces")),
     "surface_preparation": (CONDITION_TITLES["surface_preparation"], N_("how prepared")),
     "run_in_number": (CONDITION_TITLES["run_in_number"], N_("counts up by itself")),
-    "count": (N_("Runs in a row"), _COUNT),
+    "count": (N_("Runs in a row"), ""),
     "note": (N_("Note"), N_("kept with the next run")),
 }
 _FORM_COLUMNS = 5
@@ -255,10 +255,9 @@ class RunFormFields(QWidget):
         for number, (name, field) in enumerate(self._fields.items()):
             title_text, hint = _FORM_FIELDS[name]
             field.setAccessibleName(gettext(title_text))
-            if hint == _COUNT:
-                show_default(field, _COUNT)
-            else:
-                field.setPlaceholderText(gettext(hint))
+            field.setPlaceholderText(gettext(hint) if hint else "")
+            if name in _DEFAULTS:
+                show_default(field, _DEFAULTS[name])
             field.textEdited.connect(self._emit_form)
             field.left.connect(leave)
             title = label(gettext(title_text), TextRole.LABEL, muted=True)
