@@ -37,7 +37,8 @@ class PortsPresenter(Presenter[PortsState]):
     def probe(self) -> None:
         if not self._is_probing:
             self._is_probing = True
-            self._update(progress=gettext("Looking at the ports"), message=EMPTY_CHIP)
+            known = self.state.ports or None  # that there are none is to be found out anew
+            self._update(progress=gettext("Looking at the ports"), message=EMPTY_CHIP, ports=known)
             self._worker.submit(
                 port_tasks.probe_ports,
                 self.state.query_silent,
@@ -73,7 +74,7 @@ class PortsPresenter(Presenter[PortsState]):
         self._worker.close()
 
     def _suggested_form(self, url: str) -> ConnectForm | None:
-        return next((card.suggested_form for card in self.state.ports if card.url == url), None)
+        return next((card.suggested_form for card in self.state.ports or () if card.url == url), None)
 
     def _on_progress(self, progress: Progress) -> None:
         self._update(progress=progress.text)
@@ -83,12 +84,11 @@ class PortsPresenter(Presenter[PortsState]):
         self._end(cancelled if failure.is_cancelled else Chip(sentence(failure.message), Tone.BAD))
 
     def _on_listed(self, ports: tuple[PortCard, ...]) -> None:
-        self._update(ports=_with_known_devices(ports, self.state.ports))
+        self._update(ports=_with_known_devices(ports, self.state.ports or ()))
 
     def _on_probed(self, ports: tuple[PortCard, ...]) -> None:
         self._update(ports=ports)
-        none = Chip(gettext("No serial port found. Plug the amplifier in"), Tone.WARN)
-        self._end(EMPTY_CHIP if ports else none)
+        self._end(EMPTY_CHIP)
 
     def _end(self, message: Chip) -> None:
         self._is_probing = False

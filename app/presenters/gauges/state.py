@@ -85,7 +85,7 @@ class PortCard:
 class PortsState:
     """State of the tab Ports and devices."""
 
-    ports: tuple[PortCard, ...] = ()
+    ports: tuple[PortCard, ...] | None = None  # until they were listed
     progress: str = ""
     message: Chip = EMPTY_CHIP
     query_silent: bool = False  # whether the probe sends identification requests to silent devices

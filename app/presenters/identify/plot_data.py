@@ -67,6 +67,7 @@ def curves(run: AnalysedRun) -> Curves:
         no_relative_reason="" if run.relative is not None else gettext(_NO_RELATIVE[run.kind]),
         slips=tuple((start_s - origin_s, end_s - origin_s) for start_s, end_s in _slips(run)),
         noise=None if run.model is None else run.model.noise_rms_m * residual_unit.scale,
+        fitted=_fitted(run, origin_s),
     )
 
 
@@ -181,6 +182,13 @@ def _reading_unit(unit: Unit, channels: Sequence[Channel]) -> ReadingUnit:
         largest = max(float(np.nanmax(np.abs(channel.record_m), initial=0.0)) for channel in channels)
         decimals = 4 - math.ceil(math.log10(largest)) if 0.0 < largest < math.inf else 0
     return ReadingUnit(unit.symbol, max(0, decimals))
+
+
+def _fitted(run: AnalysedRun, origin_s: float) -> tuple[float, float]:
+    """From the release, if there is one, to the end of the free decay."""
+    events = run.events
+    start_s = -math.inf if events.release_s is None else 0.0
+    return start_s, math.inf if events.free_decay_end_s is None else events.free_decay_end_s - origin_s
 
 
 def _slips(run: AnalysedRun) -> tuple[tuple[float, float], ...]:

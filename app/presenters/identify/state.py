@@ -1,5 +1,6 @@
 """State of the Identify screen."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, StrEnum
@@ -48,6 +49,13 @@ class Curves:
     """Start and end of each slip, in the times of `time_s`."""
     noise: float | None = None
     """Standard deviation of the noise of the gauges, as residuals. The band is ± 2 standard deviations."""
+    fitted: tuple[float, float] = (-math.inf, math.inf)
+    """From the release to the end of the free decay, in the times of `time_s`."""
+
+    @property
+    def fit_ends_early(self) -> bool:
+        """Whether later readings were not fitted, because they were disturbed."""
+        return self.fitted[1] < float(self.time_s[-1])
 
 
 class PlotTab(StrEnum):

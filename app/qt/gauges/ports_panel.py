@@ -41,6 +41,8 @@ class PortsPanel(QWidget):
         self._lay_out()
 
     def show_state(self, state: PortsState) -> None:
+        if state.progress and (self._look.hasFocus() or self.focusWidget() is None):
+            self._list.setFocus()  # Qt would go on to the button that stops what was just begun
         self._look.setEnabled(not state.progress)
         self._stop.setEnabled(bool(state.progress))
         self._query_silent.setChecked(state.query_silent)
@@ -58,11 +60,12 @@ class PortsPanel(QWidget):
     def add_keys(self, screen: QWidget) -> None:
         bind_button(self._look, "F5", gettext("Listen on every free port, and say what speaks there"), screen)
 
-    def _rows(self, ports: tuple[PortCard, ...]) -> QWidget:
+    def _rows(self, ports: tuple[PortCard, ...] | None) -> QWidget:
         inside = QWidget()
-        is_pair = sum(card.suggested_form is not None for card in ports) > 1
-        rows: list[QWidget] = [self._row(card, is_pair) for card in ports]
-        if not ports:
+        cards = ports or ()
+        is_pair = sum(card.suggested_form is not None for card in cards) > 1
+        rows: list[QWidget] = [self._row(card, is_pair) for card in cards]
+        if ports == ():
             rows.append(label(gettext(_EMPTY), TextRole.HEADING, muted=True, wrap=True))
         make_column(*rows, STRETCH, spacing=8, margins=(16, 8), of=inside)
         return inside

@@ -1,5 +1,7 @@
 """Record against simulation for both gauges, and what is left over: three plots, one time axis."""
 
+import math
+
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Signal
@@ -11,7 +13,7 @@ from app.qt.identify.cursors import CursorLines
 from app.qt.theme import Theme
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plot_curves import Curve
-from app.qt.widgets.plot_marks import ShadedSpans, pen, place_region, shade, shaded_region
+from app.qt.widgets.plot_marks import ShadedSpans, hatching, pen, place_region, shade, shaded_region
 from app.qt.widgets.plots import PlotStack, value_at
 from app.qt.widgets.text import padded
 from messages.i18n import N_, gettext
@@ -26,6 +28,7 @@ _KEY = N_("— record &nbsp; - - simulation")
 _RECORD_ONLY = N_("— record; no motion was fitted")
 _OF_RESIDUAL = N_("table and relative; between the dashes: twice the noise")
 _OF_TABLE = N_("table; between the dashes: twice the noise")
+_UNUSED = N_("hatched: disturbed, not fitted")
 _NO_RESIDUAL = N_("nothing was fitted that could leave any")
 _CHANNELS = (N_("table displacement"), N_("relative displacement"))
 _RECORD, _SIMULATION = N_("{channel}, record"), N_("{channel}, simulation")
@@ -55,6 +58,7 @@ class CurvePlots(QWidget):
         self._hand_simulations = [plot.curve(antialias=False) for plot in (table, relative)]
         self._hand_residuals = [residual.curve(antialias=False) for _ in range(2)]
         self._slips = [ShadedSpans(plot) for plot in self._stack.plots]
+        self._unused = [ShadedSpans(plot) for plot in self._stack.plots]
         self._noise = shaded_region(residual, "horizontal")
         self._noise.setZValue(10)
         self.cursors = CursorLines(self._stack.plots)
@@ -75,12 +79,19 @@ class CurvePlots(QWidget):
             self._simulations[row].show_line(curves.time_s, channel.simulation if channel else None)
             self._residuals[row].show_line(curves.time_s, channel.residual if channel else None)
         self.show_manual_fit(None)
-        for plot, lines in zip(self._stack.plots, _lines(curves), strict=True):
+        *gauges, of_residual = zip(self._stack.plots, _lines(curves), strict=True)
+        for plot, lines in gauges:
             plot.fit_values(*lines, keep=keep)
+        start_s, end_s = curves.fitted
+        fitted = (curves.time_s >= start_s) & (curves.time_s <= end_s)
+        plot, lines = of_residual
+        plot.fit_values(*lines, shown=fitted, keep=keep)
         self._set_titles(curves)
         self._name_curves(curves)
         for slip in self._slips:
             slip.show_spans(curves.slips)
+        for unused in self._unused:
+            unused.show_spans(((end_s, math.inf),) if curves.fit_ends_early else ())
         band = 2.0 * (curves.noise or 0.0)
         place_region(self._noise, (-band, band) if band else None)
         first_s, last_s = float(curves.time_s[0]), float(curves.time_s[-1])
@@ -113,6 +124,8 @@ class CurvePlots(QWidget):
             curves.no_relative_reason or _key(relative),
             of_residual if is_fitted else gettext(_NO_RESIDUAL),
         )
+        if curves.fit_ends_early:
+            texts = (f"{texts[0]} &nbsp; {gettext(_UNUSED)}", *texts[1:])
         shown = (True, relative is not None, is_fitted)
         for row, (name, unit, text) in enumerate(zip(_NAMES, _units(curves), texts, strict=True)):
             self._stack.set_title(row, f"{gettext(name, unit=unit.symbol)} &nbsp; {text}")
@@ -142,6 +155,8 @@ class CurvePlots(QWidget):
             self._hand_residuals[row].setPen(pen(_mixed(token, tokens.surface)))
         for slip in self._slips:
             slip.set_brush(shade(tokens.channel_2, tokens.slip_alpha))
+        for unused in self._unused:
+            unused.set_brush(hatching(tokens.muted))
         self._noise.setBrush(pg.mkBrush(None))
         for line in self._noise.lines:
             line.setPen(pen(tokens.text, dashes=(4.0, 4.0)))

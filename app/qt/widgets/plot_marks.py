@@ -26,6 +26,13 @@ def shade(token_colour: str, alpha: float) -> Any:
     return pg.mkBrush(colour(token_colour, alpha))
 
 
+def hatching(ink: str) -> Any:
+    """Brush of what was not used."""
+    brush = QBrush(colour(ink, 0.4))
+    brush.setStyle(Qt.BrushStyle.BDiagPattern)
+    return brush
+
+
 def shaded_region(plot: "Plot", orientation: str = "vertical") -> Any:
     """Add a hidden shaded span behind the curves of a plot; `place_region` shows it."""
     item = pg.LinearRegionItem(orientation=orientation, movable=False, pen=pg.mkPen(None))
@@ -88,6 +95,7 @@ class ShadedSpans(_Backdrop):
 
     def paint(self, painter: QPainter, *_: Any) -> None:
         seen = self.viewRect()
+        self._brush.setTransform(painter.worldTransform().inverted()[0])  # a hatching has the pitch of pixels
         for start, end in self._spans:
             left, right = max(start, seen.left()), min(end, seen.right())
             if left < right:

@@ -87,9 +87,11 @@ class Plot:
         """Set the range of values that a reset shows; none beyond it can be shown."""
         self.view.set_home(Y, (low, high), keep=keep)
 
-    def fit_values(self, *lines: Floats, keep: bool = False) -> None:
-        """Show all values of lines, with a margin."""
-        self.set_value_range(*value_extent(*lines), keep=keep)
+    def fit_values(self, *lines: Floats, shown: NDArray[np.bool_] | None = None, keep: bool = False) -> None:
+        """Show all values of lines, with a margin; with `shown` (n,) those, and the others on demand."""
+        limits = value_extent(*lines)
+        home = limits if shown is None else value_extent(*(line[shown] for line in lines))
+        self.view.set_home(Y, home, limits, keep=keep)
 
     def autoscale(self) -> None:
         """Fit the height to what is in view."""

@@ -183,6 +183,9 @@ def test_keys_reach_every_tab_and_the_ports(stage: Stage) -> None:
 
 def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
     stage.presenter.set_tab(GaugesTab.PORTS)
+    stage.presenter.ports.probe()
+    assert "No serial port is plugged" not in stage.words(), "nobody has looked yet"
+    stage.prober.calls[-1].done(())
     assert "No serial port is plugged" in stage.words()
     stage.fill()
     assert "not verified on hardware" in stage.words()

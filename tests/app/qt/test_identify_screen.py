@@ -1,5 +1,6 @@
 """The Identify screen: record against simulation, or words for what is missing."""
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -12,7 +13,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QPushButton
 from pytestqt.qtbot import QtBot
-from stage import Call, FakeWorker, analysed
+from stage import END_S, RELEASED_S, Call, FakeWorker, analysed
 
 from analysis.catalogue import CATALOGUE
 from analysis.identification import Degree, Events, FittedModel, ModelSelection
@@ -129,6 +130,22 @@ def test_a_run_is_drawn_with_all_that_was_found(stage: Stage) -> None:
     assert stage.curves._noise.getRegion() == pytest.approx((-40.0, 40.0))
     spans = [plot.view.viewRange()[0] for plot in stage.curves._stack.plots]
     assert spans[0] == spans[1] == spans[2] == pytest.approx([-1.0, 9.999])
+
+
+def test_residuals_are_scaled_by_what_was_fitted_and_the_rest_is_hatched(stage: Stage) -> None:
+    run = analysed()
+    moved = run.time_s > END_S - 2.0
+    table = Channel(np.where(moved, 0.0, run.table.record_m), run.table.fit_m)
+    events = replace(run.events, free_decay_end_s=END_S - 2.0)
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(replace(run, table=table, events=events))
+    view = stage.curves._stack.plots[2].view
+    low, high = view.viewRange()[1]
+    assert -150.0 < low < -60.0 < 60.0 < high < 150.0
+    view.show_ranges({1: (-5000.0, 5000.0)})
+    assert view.viewRange()[1][0] < -1000.0, "what is hatched can be looked at"
+    assert stage.curves._unused[0].spans == (pytest.approx((END_S - 2.0 - RELEASED_S, math.inf)),)
+    assert "hatched" in stage.curves._stack.plots[0].title.text
 
 
 def test_friction_by_slip_has_a_tab_with_what_it_says_of_the_paper(stage: Stage) -> None:

@@ -3,7 +3,7 @@
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QPushButton
+from PySide6.QtWidgets import QAbstractButton, QApplication, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import Call
 from window_desk import Desk
@@ -97,6 +97,16 @@ def test_a_device_of_one_gauge_is_filled_in_and_not_connected(desk: Desk) -> Non
     desk.qtbot.mouseClick(use, Qt.MouseButton.LeftButton)
     assert not dialog.isVisible()
     assert desk.presenter.start.state.form == form
+
+
+def test_enter_does_not_stop_a_look_that_has_begun(desk: Desk) -> None:
+    dialog, _ = find(desk)
+    dialog.activateWindow()
+    desk.qtbot.waitUntil(dialog.isActiveWindow)
+    assert not isinstance(dialog.focusWidget(), QAbstractButton)
+    desk.qtbot.keyClick(dialog.focusWidget(), Qt.Key.Key_Return)
+    assert desk.presenter.gauges.ports._worker.cancelled == 0  # type: ignore[attr-defined]
+    assert dialog.isVisible()
 
 
 def test_closing_the_dialog_stops_looking(desk: Desk) -> None:
