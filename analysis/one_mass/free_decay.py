@@ -118,8 +118,8 @@ def fit_free_decay(readings: Channel, order: int, unit: str) -> FreeDecayFit:
 
 def _stopped_warning(stopped_s: float) -> ResultWarning:
     template = N_(
-        "the swing was stopped {stopped_s} s after the first reading: only readings before are used. Leave"
-        " the table alone until the record has ended."
+        "the swing was stopped before the record ended: only readings until {stopped_s} s after the first are"
+        " used. Leave the table alone until the record has ended."
     )
     return result_warning("moved-again", template, stopped_s=format_number(stopped_s))
 

@@ -399,8 +399,8 @@ def _until_disturbance(stretch: _Stretch, period_s: float) -> _Stretch:
 
 def _moved_warning(release: Release) -> ResultWarning:
     template = N_(
-        "the plate or the table was moved {after_s} s after the release: only readings before are used. Leave"
-        " the stand alone until the record has ended."
+        "the plate or the table was moved before the record ended: only readings until {after_s} s after the"
+        " release are used. Leave the stand alone until the record has ended."
     )
     return result_warning("moved-again", template, after_s=format_number(release.end_s - release.time_s))
 

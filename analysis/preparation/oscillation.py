@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
 from analysis.laws.parameters import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
-from analysis.preparation.channels import Channel, detect_hum, remove_hum
+from analysis.preparation.channels import NOISE_FLOOR_M, Channel, detect_hum, remove_hum
 from analysis.preparation.sums import swing_equations, windows
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import RecordError
@@ -29,6 +29,10 @@ _PLATEAU_MIN_S = 0.05
 _STILL = 0.005  # share of the widest swing that hum may move a table that is held
 _CHANCE = 4.0
 """A median distance of n readings exceeds that of many by more than this over sqrt(n) only once in 10,000."""
+_SETTLED_S = 0.02  # a period of hum: so long are the parts of the hold that are compared with its end
+_SETTLED_SIGMAS = (
+    7.0  # of such a mean of white noise; medians of three scatter less than what they are made of
+)
 _RISE_S = 0.3  # from the hold to the fastest swing takes less
 _RISE_LAG_S = 0.02  # readings this long before the table has left its hold for sure may belong to the release
 _LEFT = 0.03  # share of the way to the fastest sample; passed some hundredths of a second after the release
@@ -230,9 +234,25 @@ def _hold_begin(table: Channel, rise: int, scatter_max_m: float) -> int | None:
     scatter = 1.4826 * float(np.median(np.abs(last - level)))
     away = np.flatnonzero(np.abs(x[:end] - level) > 6.0 * max(scatter, scatter_max_m / 3.0))
     start = int(away[-1]) + 1 if len(away) else 0
+    start += _unsettled(Channel(t[start:end], x[start:end]), scatter)
     by_chance = 1.0 + _CHANCE / float(np.sqrt(len(last)))
     still = scatter <= by_chance * scatter_max_m and t[end] - t[start] >= _PLATEAU_MIN_S and end - start >= 5
     return start if still else None
+
+
+def _unsettled(hold: Channel, scatter_m: float) -> int:
+    """Count of the first readings off the line through the second half: the end of the pull."""
+    half = len(hold) // 2
+    if half < _READINGS_MIN:
+        return 0
+    t = hold.time_s - hold.time_s[half]
+    off_m = hold.value_m - np.polyval(np.polyfit(t[half:], hold.value_m[half:], 1), t)
+    bounds = np.searchsorted(t[:half], np.arange(t[0], 0.0, _SETTLED_S))
+    sums, counts = np.diff(np.concatenate(([0.0], np.cumsum(off_m)))[bounds]), np.diff(bounds)
+    # At its far end the line is uncertain by sqrt(28 / half) standard deviations.
+    limit = _SETTLED_SIGMAS * (scatter_m + NOISE_FLOOR_M) * np.sqrt(counts + 28.0 * counts**2 / half)
+    off = np.flatnonzero(np.abs(sums) > limit)
+    return int(bounds[off[-1] + 1]) if len(off) else 0
 
 
 def _release_time(rising: Channel, level: float) -> float:

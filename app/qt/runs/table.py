@@ -36,12 +36,12 @@ _MEASURED = {Column.FRICTION: "f_d", Column.PERIOD: "T", Column.DAMPING: "n1"}
 _RIGHT = {*_MEASURED, Column.DURATION, Column.TEMPERATURE}
 _WIDTHS = {
     Column.NAME: 60,
-    Column.DATE: 132,
+    Column.DATE: 128,
     Column.SERIES: 66,
-    Column.FRICTION: 140,
+    Column.FRICTION: 134,
     Column.PERIOD: 78,
     Column.DAMPING: 76,
-    Column.VERDICT: 90,
+    Column.VERDICT: 100,
     Column.SOURCE: 76,
     Column.TEMPERATURE: 44,
     Column.NOTE: 44,

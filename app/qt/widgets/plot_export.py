@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
 from PySide6.QtCore import QBuffer, QIODevice, QPoint, QRect, QSaveFile, QStandardPaths, Qt
 from PySide6.QtGui import QGuiApplication, QPainter
@@ -16,21 +17,33 @@ FORMATS = {"png": N_("Pictures (*.png)"), "svg": N_("Drawings (*.svg)"), "csv": 
 _RESOLUTION_DPI = 96
 """Of SVG: its units are then the pixels of the screen."""
 
+_chosen_folders: list[str] = []
+"""The folder into which the last plot was saved; none at first."""
+
 
 def copy_picture(shown: QWidget) -> None:
     QGuiApplication.clipboard().setPixmap(shown.grab())
 
 
-def ask_for_file(parent: QWidget, suffix: str, name: str, content: Callable[[], bytes]) -> None:
-    """Let the operator choose a file, and write the content into it; a fault is shown in a line."""
+def ask_for_file(
+    parent: QWidget,
+    suffix: str,
+    name: str,
+    content: Callable[[], bytes],
+    written: Callable[[Path], object],
+) -> None:
+    """Let the operator choose a file, write the content into it, and call `written`; a fault is shown.
+
+    The folder chosen last is offered.
+    """
     documents = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.DocumentsLocation)
-    dialog = QFileDialog(parent, gettext("Save"), documents)
+    dialog = QFileDialog(parent, gettext("Save"), _chosen_folders[-1] if _chosen_folders else documents)
     dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
     dialog.setNameFilter(gettext(FORMATS[suffix]))
     dialog.setDefaultSuffix(suffix)
     dialog.selectFile(f"{name}.{suffix}")
     dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-    dialog.fileSelected.connect(lambda path: _save(parent, path, content))
+    dialog.fileSelected.connect(lambda path: _save(parent, Path(path), content, written))
     dialog.open()
 
 
@@ -85,17 +98,22 @@ def _without_pictures(shown: QWidget) -> Iterator[None]:
             view.setCacheMode(QGraphicsView.CacheModeFlag.CacheBackground)
 
 
-def _save(parent: QWidget, path: str, content: Callable[[], bytes]) -> None:
+def _save(
+    parent: QWidget, path: Path, content: Callable[[], bytes], written: Callable[[Path], object]
+) -> None:
     try:
         data = content()
     except CurveTableError as error:
         _tell(parent, translate(error.message))
         return
-    file = QSaveFile(path)
-    if not (file.open(QIODevice.OpenModeFlag.WriteOnly) and file.write(data) == len(data) and file.commit()):
+    file = QSaveFile(str(path))
+    if file.open(QIODevice.OpenModeFlag.WriteOnly) and file.write(data) == len(data) and file.commit():
+        _chosen_folders[:] = [str(path.parent)]
+        written(path)
+    else:
         fault = message(
             "{path} could not be written: {reason}. Choose another place",
-            path=path,
+            path=str(path),
             reason=file.errorString(),
         )
         _tell(parent, translate(fault))

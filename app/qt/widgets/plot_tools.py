@@ -4,19 +4,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPoint, QSize, Qt
+from PySide6.QtCore import QPoint, QSize, Qt, QTimer
 from PySide6.QtGui import QIcon, QKeyEvent, QKeySequence
 from PySide6.QtWidgets import QFrame, QMenu, QToolButton, QWidget
 
 from app.qt.theme import Tokens, set_property
 from app.qt.widgets import plot_export
+from app.qt.widgets.folder_button import OpenFolderButton
 from app.qt.widgets.icons import icon
 from app.qt.widgets.layouts import make_row
 from app.qt.widgets.plot_view import PAN, STEP, X, Y
 from app.qt.widgets.shortcuts import describe_shortcut
-from app.qt.widgets.text import set_tool_tip
+from app.qt.widgets.text import label, set_tool_tip
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ _PAN_KEYS = {
     Qt.Key.Key_Up: (Y, PAN),
     Qt.Key.Key_Down: (Y, -PAN),
 }
+_WRITTEN_MS = 10_000  # so long the name of a written file stands in a plot
 _GAP = 4  # pixels between the bar and the edges of the first plot
 
 
@@ -62,6 +65,7 @@ class PlotTools:
     def __init__(self, stack: "PlotStack") -> None:
         self._stack = stack
         self._bar: _Bar | None = None
+        self._written: _Written | None = None
         self.menu: QMenu | None = None
         describe_shortcut(
             stack,
@@ -110,9 +114,12 @@ class PlotTools:
             self._bar.hide()
 
     def place_bar(self) -> None:
+        room = self._stack.first_plot_rect()
         if self._bar is not None:
-            room = self._stack.first_plot_rect()
             self._bar.move(room.right() - self._bar.width() - _GAP, room.top() + _GAP)
+        if self._written is not None:
+            self._written.adjustSize()
+            self._written.move(room.left() + _GAP, room.bottom() - self._written.height() - _GAP)
 
     def restyle(self, tokens: Tokens) -> None:
         if self._bar is not None:
@@ -141,8 +148,9 @@ class PlotTools:
         """What is pictured, without bar, crosshair and frame of the focus."""
         stack = self._stack
         was_shown = self._bar is not None and self._bar.isVisibleTo(stack)
-        if self._bar is not None:
-            self._bar.hide()
+        for part in (self._bar, self._written):
+            if part is not None:
+                part.hide()
         stack.forget_pointer()
         set_property(stack, "role", "plots-pictured")
         try:
@@ -153,7 +161,13 @@ class PlotTools:
                 self._bar.setVisible(was_shown)
 
     def _save(self, suffix: str, content: Callable[[], bytes]) -> None:
-        plot_export.ask_for_file(self._stack, suffix, self._stack.export_name, content)
+        plot_export.ask_for_file(self._stack, suffix, self._stack.export_name, content, self._show_written)
+
+    def _show_written(self, path: Path) -> None:
+        if self._written is None:
+            self._written = _Written(self._stack)
+        self._written.show_file(path)
+        self.place_bar()
 
     def _bar_tools(self) -> list[Tool]:
         wheel, more = gettext("wheel; with Ctrl in height"), gettext("right click")
@@ -190,6 +204,25 @@ class PlotTools:
     def _open_menu_of_bar(self) -> None:
         if self._bar is not None:
             self.open_menu(self._bar.mapToGlobal(self._bar.rect().bottomLeft()))
+
+
+class _Written(QFrame):
+    """Says for a while which file was written, and opens its folder."""
+
+    def __init__(self, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setProperty("role", "plot-tools")
+        self._text, self._open_folder = label(), OpenFolderButton()
+        self._open_folder.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        make_row(self._text, self._open_folder, spacing=8, margins=(8, 4), of=self)
+        self._timer = QTimer(self, singleShot=True, interval=_WRITTEN_MS)
+        self._timer.timeout.connect(self.hide)
+
+    def show_file(self, path: Path) -> None:
+        self._text.setText(gettext("Wrote {files}", files=path.name))
+        self._open_folder.show_folder(str(path.parent))
+        self.show()
+        self._timer.start()
 
 
 class _Bar(QFrame):

@@ -42,6 +42,18 @@ def test_hold_is_told_from_the_rest_and_the_pull_before_it():
     assert 5.9 < release.plateau_start_s < 6.5
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_hold_begins_where_a_smooth_pull_has_ended(seed):
+    truth = Truth(pull_s=0.6, hold_s=0.6, rate_hz=2000.0, noise_m=2e-5, duration_s=5.0, seed=seed)
+    table, _ = channels(truth)
+
+    (release,) = find_releases(table)
+
+    held = table.between(release.plateau_start_s, release.plateau_start_s + 0.04).value_m
+    assert abs(held.mean() - 0.0123) < 5.0 * 2e-5 / np.sqrt(len(held)) + 2e-6
+    assert release.time_s - release.plateau_start_s > 0.4
+
+
 def test_a_record_that_begins_after_the_release_has_no_hold():
     table, _ = channels(Truth(duration_s=5.0))
 

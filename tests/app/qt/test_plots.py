@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from looking import visible_words
 from pointing import Hand
-from PySide6.QtCore import QEvent, QPointF, Qt
-from PySide6.QtGui import QColor, QEnterEvent, QGuiApplication, QImage
-from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QMessageBox, QToolButton
+from PySide6.QtCore import QDir, QEvent, QPointF, Qt, QUrl
+from PySide6.QtGui import QColor, QDesktopServices, QEnterEvent, QGuiApplication, QImage
+from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QMessageBox, QPushButton, QToolButton
 from pytestqt.qtbot import QtBot
 
 from app.qt.theme import Theme
@@ -325,6 +326,25 @@ def test_curves_in_view_are_saved_as_a_table_with_units(stack: PlotStack, hand: 
     np.testing.assert_allclose(
         [float(row[1]) for row in rows], 10.0 * np.array([float(row[2]) for row in rows])
     )
+
+
+def test_a_saved_plot_is_named_and_its_folder_opens_and_is_offered_again(
+    stack: PlotStack, hand: Hand, tmp_path: Path, qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opened: list[QUrl] = []
+    monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)
+    save(stack, hand, "Save as CSV…", tmp_path / "a.csv")
+    assert "Wrote a.csv" in visible_words(stack)
+    (folder,) = [b for b in stack.findChildren(QPushButton) if b.isVisible()]
+    qtbot.mouseClick(folder, Qt.MouseButton.LeftButton)
+    assert opened == [QUrl.fromLocalFile(str(tmp_path))]
+    trigger(stack, hand, "Save as PNG…")
+    (dialog,) = stack.findChildren(QFileDialog)
+    assert dialog.directory() == QDir(str(tmp_path))
+    dialog.fileSelected.emit(str(tmp_path / "b.png"))
+    dialog.close()
+    stack._tools._written._timer.stop()
+    assert "Wrote b.png" in visible_words(stack)
 
 
 def test_the_file_has_a_name_and_its_suffix(stack: PlotStack, hand: Hand) -> None:
