@@ -28,6 +28,8 @@ def fill_menu(button: QToolButton, window: QWidget, show_keys: Callable[[], obje
     menu.addAction(gettext("About Slipstand")).triggered.connect(lambda: AboutDialog(window).show())
     menu.addSeparator()
     menu.addAction(gettext("Quit")).triggered.connect(window.close)
+    menu.aboutToHide.connect(lambda: button.setAttribute(Qt.WidgetAttribute.WA_UnderMouse, on=False))
+    menu.aboutToHide.connect(button.update)  # Qt would draw the pointer over it until it comes again
     button.setMenu(menu)
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
 

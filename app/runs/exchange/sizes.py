@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.formatting import format_number
 from app.runs.errors import ImportFileError
 from app.runs.exchange.importing import LENGTH_UNITS_M, Floats, ForeignRecord, ImportPlan, LengthUnit
 from config.schema import Gauges
@@ -96,4 +97,4 @@ def _moves(cells: Floats, span: float) -> bool:
 
 def _length(length_m: float) -> str:
     unit, scale = ("m", 1.0) if length_m >= 1.0 else ("mm", 1e3) if length_m >= _SMALLEST_M else ("µm", 1e6)
-    return f"{scale * length_m:.4g} {unit}"
+    return f"{format_number(scale * length_m, 4)} {unit}"

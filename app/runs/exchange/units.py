@@ -25,6 +25,8 @@ _RUSSIAN = {
 }  # fmt: skip
 _BEHIND = re.compile(r"[\[({<]\s*([^\[\](){}<>]{1,12}?)\s*[\])}>]\s*$")
 _AFTER = re.compile(r"(?:,|\s/|_|:|\bin)\s*([^\s,_/]{1,8}(?:/[^\s,_/]{1,4})?)\s*$")
+_APART = re.compile(r"\s(мм|мкм|мс|[mnuµμ]m|cm|[mnuµμ]s|sec)\s*$")
+"""Units that are no words: `gauge in`, `u1 min` and `channel s` are names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +61,11 @@ def parse_unit(text: str) -> Unit | None:
 
 
 def unit_in_name(name: str) -> str:
-    """Unit behind the name of a column, such as `t (ms)`, `u1 [mm]`, `u1, mm` or `u1_mm`; "" without one."""
+    """Unit behind the name of a column, such as `t (ms)`, `u1 [mm]`, `u1, mm`, `u1 mm` or `u1_mm`; "" without one."""
     found = _BEHIND.search(name)
     if found is not None:
         return found[1] if parse_unit(found[1]) else ""
-    found = _AFTER.search(name)
+    found = _AFTER.search(name) or _APART.search(name)
     unit = parse_unit(found[1]) if found else None
     # Without brackets only times and lengths are units: `u_g` or `x_n` are names.
     is_plain = unit is not None and (unit.is_time or unit.quantity == "displacement") and unit.text != "h"

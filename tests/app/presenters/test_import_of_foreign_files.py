@@ -201,6 +201,7 @@ def test_displacements_in_another_unit_are_asked_about(tmp_path: Path) -> None:
             "um",
             "Gauge 1 moves by 23.02 m, more than its range of 33 mm. Is the file in µm?",
         ),
+        ("t;u1", 1e3, "um", "Gauge 1 moves by 23020 m, more than its range of 33 mm. Is the file in µm?"),
         ("t;u1 [mm]", 3.0, "", "Gauge 1 moves by 69.06 mm, more than its range of 33 mm. Is that right?"),
     ],
 )

@@ -11,6 +11,7 @@ from app.runs.errors import ImportFileError
 from app.runs.exchange import csv_reading
 from app.runs.exchange.csv_layout import FileLayout
 from app.runs.exchange.csv_reading import read_columns
+from app.runs.exchange.units import unit_in_name
 
 BASIC = FileLayout("time", "table", "rel")
 TABLE = np.array([[0.0, 1.5, -2.0], [0.5, 2.5, -3.0], [1.0, 3.5, -4.0]])
@@ -142,3 +143,21 @@ def test_any_numbers_by_another_writer_are_read_exactly(tmp_path_factory, rows, 
         decimal="," if comma else ".",
     )
     assert read_columns(path, layout).values.tobytes() == np.array(rows).tobytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("u1 mm", "mm"),
+        ("table displacement µm", "µm"),
+        ("Стол мм", "мм"),
+        ("time ms", "ms"),
+        ("u1, mm", "mm"),
+        ("gauge in", ""),
+        ("u1 min", ""),
+        ("channel s", ""),
+        ("plate m", ""),
+    ],
+)
+def test_a_unit_may_stand_apart_behind_the_name_of_a_column(name: str, unit: str) -> None:
+    assert unit_in_name(name) == unit
