@@ -61,7 +61,7 @@ def parse_unit(text: str) -> Unit | None:
 
 
 def unit_in_name(name: str) -> str:
-    """Unit behind the name of a column, such as `t (ms)`, `u1 [mm]`, `u1, mm`, `u1 mm` or `u1_mm`; "" without one."""
+    """Unit behind the name of a column: `t (ms)`, `u1 [mm]`, `u1, mm`, `u1 mm`, `u1_mm`; "" without one."""
     found = _BEHIND.search(name)
     if found is not None:
         return found[1] if parse_unit(found[1]) else ""
