@@ -110,6 +110,24 @@ def spawn(
         )
 
 
+def allow_open_files(count: int) -> int:
+    """Let this process and its children have more files open where they may; return how many they may.
+
+    `count` is what is wanted. macOS lets a program open 256 at first, which many processes at once exceed.
+    """
+    if sys.platform == "win32":  # its limit is some 16 million handles
+        return count
+    import resource
+
+    now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if now == resource.RLIM_INFINITY or now >= count:
+        return count
+    wanted = count if most == resource.RLIM_INFINITY else min(count, most)
+    with contextlib.suppress(ValueError, OSError):
+        resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, most))
+    return resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+
+
 @contextlib.contextmanager
 def hold_interrupts() -> Iterator[None]:
     """Block Ctrl-C here and in processes that are started meanwhile, where the system can.

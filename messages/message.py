@@ -5,6 +5,7 @@ is a look-up of the template (`messages.i18n`); no code reads a sentence.
 """
 
 import enum
+import errno
 from collections.abc import Mapping, Sequence
 from gettext import NullTranslations
 from pathlib import PurePath
@@ -119,7 +120,24 @@ def message_of(error: BaseException) -> Message:
     """Message of an error; of errors that carry none, or one of several lines, their text on one line."""
     if isinstance(error, MessageError) and "\n" not in str(error):
         return error.message
+    if lacking := lacking_resource(error):
+        return lacking
     return message("{text}", text=" ".join(str(error).split()) or type(error).__name__)
+
+
+_OPEN_FILES = (errno.EMFILE, errno.ENFILE)
+
+
+def lacking_resource(error: BaseException) -> Message:
+    """Message of an error for which this computer, and no file, is to blame; EMPTY for any other."""
+    number = getattr(error, "errno", None)
+    if number in _OPEN_FILES:
+        return message(
+            "too many files are open: close other programs, or allow more open files (ulimit -n 256)"
+        )
+    if number == errno.ENOMEM or isinstance(error, MemoryError):
+        return message("this computer has too little memory left: close other programs")
+    return EMPTY
 
 
 def _value(value: object) -> Value:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from app.acquisition.errors import DiskSpaceError
 from app.acquisition.messages import RunSettings
-from app.runs.disk import MARGIN_BYTES, free_bytes
+from app.runs.disk import FILES_OF_RUN, MARGIN_BYTES, free_bytes, free_files
 from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
@@ -52,8 +52,14 @@ class DiskDemand:
 
 def check_disk_space(folder: Path, run: RunSettings, demand: DiskDemand) -> Message:
     """Return a warning about the free space, or EMPTY. Raises DiskSpaceError if a run does not fit."""
-    free = free_bytes(folder)
+    free, files = free_bytes(folder), free_files(folder)
     needed = demand.of_run(run)
+    if files is not None and 0 < files < FILES_OF_RUN:  # file systems that know no number may tell 0
+        template = N_(
+            "{folder}: the disk takes only {files} more files, and this run {needed}. Remove some files"
+            " or record to another disk"
+        )
+        raise DiskSpaceError(template, folder=folder, files=files, needed=FILES_OF_RUN)
     if free is None:
         return EMPTY
     if free < needed:

@@ -207,7 +207,7 @@ class Recording:
             return None
         result = file.close_result.result()
         self._ended = result.fault or self._ended
-        self._store_note(result.message, first=True)
+        self._notes = [*result.notes, *(note for note in self._notes if note not in result.notes)]
         return self._run_ended(result.path, file.statistics.losses())
 
     def _discard_journal(self) -> None:

@@ -95,7 +95,8 @@ class CloseResult:
 
     path: str
     fault: EndReason | None = None
-    message: Message = EMPTY
+    notes: tuple[Message, ...] = ()
+    """What went wrong, and what to do."""
 
 
 class RunFile:
@@ -204,7 +205,7 @@ class RunFile:
             notes.append(message(template, samples=sum(map(len, lost))))
         path = stored.path if stored else self._known_path()
         reason = None if first is None else end_reason(first)
-        self.close_result.set_result(CloseResult(path, reason, sentences(*notes)))
+        self.close_result.set_result(CloseResult(path, reason, tuple(notes)))
 
     def _stored(self, ending: EndMetadata) -> StoredRun:
         size = self.statistics.losses().samples * ROW_BYTES + self._journal.size

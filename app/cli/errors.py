@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from app.runs.errors import internal_error
-from messages.message import MessageError
+from messages.message import MessageError, lacking_resource
 
 
 class CommandError(Exception):
@@ -17,6 +17,8 @@ def alternatives(values: Sequence[str]) -> str:
 
 def error_text(error: Exception) -> str:
     """Say in one line what happened; a fault of the program itself is called one."""
+    if lacking := lacking_resource(error):
+        return str(lacking)
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
         return f"{error.filename}: {error.strerror}. Check the path, its rights and its disk"
     return " ".join(str(error).split()) if is_expected(error) else str(internal_error(error))

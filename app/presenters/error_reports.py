@@ -57,7 +57,8 @@ class ErrorReporter:
     def _on_uncaught(
         self, kind: type[BaseException], error: BaseException, trace: TracebackType | None = None
     ) -> None:
-        sys.__excepthook__(kind, error, trace)
+        if not isinstance(error, Exception) or not is_user_error(error):
+            sys.__excepthook__(kind, error, trace)
         if isinstance(error, Exception):
             self.report(error_report(error))
 

@@ -19,7 +19,7 @@ from app.presenters.base import ReportProgress, TaskFailure
 from app.presenters.error_reports import ErrorReport, error_report, is_user_error
 from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
 from messages.i18n import language, use_language
-from messages.message import message
+from messages.message import message, message_of
 
 Answer = TypeVar("Answer")
 Arguments = TypeVarTuple("Arguments")
@@ -119,7 +119,7 @@ class Worker:
         self._process: _TaskProcess | None = None
         self._ending: list[_TaskProcess] = []
         self._waiting: deque[_Task] = deque()
-        self._cancelled: deque[_Task] = deque()
+        self._failed: deque[tuple[_Task, TaskFailure]] = deque()
 
     @property
     def is_busy(self) -> bool:
@@ -169,7 +169,7 @@ class Worker:
 
     def cancel(self) -> None:
         """Abort all tasks, which fail; the next task starts another process."""
-        self._cancelled += self._waiting
+        self._failed += ((task, TaskFailure(CANCELLED, is_cancelled=True)) for task in self._waiting)
         self._waiting.clear()
         self._end(abort=True)
 
@@ -182,9 +182,14 @@ class Worker:
         self._ending.clear()
 
     def _send(self, task: _Task) -> None:
-        self._waiting.append(task)
         if self._process is None:
-            self._process = _TaskProcess() if self._pool is None else self._pool.acquire()
+            try:
+                self._process = _TaskProcess() if self._pool is None else self._pool.acquire()
+            except OSError as error:
+                _log.error("a process could not be started: %s", error)
+                self._failed.append((task, TaskFailure(message_of(error))))
+                return
+        self._waiting.append(task)
         self._process.send(task)
 
     def _end(self, *, abort: bool) -> None:
@@ -194,8 +199,9 @@ class Worker:
             self._process = None
 
     def _next_callback(self) -> Callable[[], object] | None:
-        if self._cancelled:
-            return partial(self._cancelled.popleft().failed, TaskFailure(CANCELLED, is_cancelled=True))
+        if self._failed:
+            task, failure = self._failed.popleft()
+            return partial(task.failed, failure)
         if self._process is None:
             return None
         try:
@@ -234,13 +240,17 @@ class _TaskProcess:
 
     def __init__(self) -> None:
         context = multiprocessing.get_context("spawn")
-        self._pipe, child_pipe = context.Pipe()
-        child_lifeline, self._lifeline = context.Pipe(duplex=False)
+        with contextlib.ExitStack() as ends:  # they are closed where the process does not start
+            self._pipe, child_pipe = (ends.enter_context(end) for end in context.Pipe())
+            child_lifeline, self._lifeline = (ends.enter_context(end) for end in context.Pipe(duplex=False))
+            arguments = (child_pipe, child_lifeline, language(), displacement_unit())
+            self._process: BaseProcess = context.Process(
+                target=_serve, args=arguments, name="slipstand-analysis"
+            )
+            self._process.start()
+            ends.pop_all()
         # The interpreter joins its children at exit: they must end even if nobody calls `close`.
         atexit.register(self._lifeline.close)
-        arguments = (child_pipe, child_lifeline, language(), displacement_unit())
-        self._process: BaseProcess = context.Process(target=_serve, args=arguments, name="slipstand-analysis")
-        self._process.start()
         child_pipe.close()
         child_lifeline.close()
         self._end_s = float("inf")

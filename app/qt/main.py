@@ -13,7 +13,7 @@ from PySide6.QtGui import QIcon
 from PySide6.QtWidgets import QApplication, QMessageBox
 
 from analysis.catalogue import DISPLACEMENT_UNITS, use_displacement_unit
-from app.child_process import end_signals
+from app.child_process import allow_open_files, end_signals
 from app.log import start_log
 from app.presenters.composition import make_window_presenter, read_personal
 from app.presenters.error_reports import ErrorReporter, error_report
@@ -27,6 +27,8 @@ from messages.i18n import LANGUAGE_VARIABLE, language, translate, use_language
 _WARM_UP_MS = 2000
 """Delay before the analysis is loaded: engine and simulated stand, needed earlier, start first."""
 _INTERRUPTED = 130
+_OPEN_FILES, _OPEN_FILES_LEAST = 1024, 64
+"""Files that the window may have open at once: processes of an analysis, each with its pipes, are most."""
 _ICON = Path(__file__).with_name("slipstand.svg")
 
 
@@ -40,6 +42,11 @@ def run_window(simulated: bool = False, series: str = "1FFM0", run: str = "") ->
         return _refuse(f"{run}: there is no such file. Give a run file, or a command: slipstand --help")
     if not _has_display():
         return _refuse("there is no display here. Use the commands, `slipstand --help`, or set DISPLAY")
+    if (files := allow_open_files(_OPEN_FILES)) < _OPEN_FILES_LEAST:
+        return _refuse(
+            f"the window may open {files} files at once, and needs {_OPEN_FILES_LEAST}."
+            " Allow more: ulimit -n 256"
+        )
     errors, personal = ErrorReporter(), read_personal()
     start_log("window", personal.settings.log_level)
     errors.install_hooks()

@@ -25,6 +25,7 @@ from config.durable_files import (
     sync_folder,
 )
 from messages.i18n import N_
+from messages.message import lacking_resource
 
 UNFINISHED_SUFFIX = ".making"
 """Ends the names of unfinished runs and journals. `remove_abandoned` removes those of dead processes."""
@@ -32,8 +33,12 @@ UNFINISHED_SUFFIX = ".making"
 MARGIN_BYTES = 1 << 20
 """Claimed beyond the next need of a run, so that its file can still be closed in good order."""
 
+FILES_OF_RUN = 6
+"""Journal, lock and run, each with a second name while it is made, at once: fewer have made a run fail."""
+
 _NO_SPACE = {errno.ENOSPC, errno.EFBIG, getattr(errno, "EDQUOT", errno.ENOSPC)}
 """No space on the disk, in the quota, or within the largest size of a file."""
+NO_FILE_LEFT = N_("{path}: the disk takes no more files. Remove some files or take another disk")
 LONGEST_PATH = 239 if sys.platform == "win32" else None
 """Windows takes 259 characters unless it is set up otherwise; names of unfinished files are 20 longer."""
 
@@ -81,6 +86,24 @@ def free_bytes(folder: Path) -> int | None:
     return usage.free if usage.total else None  # some network file systems report 0 of 0
 
 
+def free_files(folder: Path) -> int | None:
+    """Files that can be made where a folder is or would be made; None where the disk sets no number."""
+    if sys.platform == "win32":
+        return None
+    existing = next((path for path in (folder, *folder.parents) if path.is_dir()), folder)
+    try:
+        disk = os.statvfs(existing)
+    except OSError:
+        return None
+    return disk.f_favail if disk.f_files else None
+
+
+def lacks_files(folder: Path) -> bool:
+    """Tell whether a disk that took nothing has free bytes, and no number for another file."""
+    files, free = free_files(folder), free_bytes(folder)
+    return files is not None and files < FILES_OF_RUN and (free or 0) > MARGIN_BYTES
+
+
 def is_disk_full(error: OSError) -> bool:
     """Tell whether a write failed for lack of space: disk, quota, or largest size of a file."""
     return error.errno in _NO_SPACE
@@ -98,8 +121,12 @@ def storage_error(path: Path, error: Exception) -> RunError:
     words = str(error).replace("\n", " ")
     if is_in_use(error, path):
         return WriteError(file_in_use(path).message)
+    if lacking := lacking_resource(error):
+        return WriteError("{path}: {fault}", path=path, fault=lacking)
     if isinstance(error, FileExistsError):
         return RunExistsError("{path} exists already and is not overwritten. Choose another name", path=path)
+    if number == errno.ENOSPC and lacks_files(path.parent):
+        return DiskFullError(NO_FILE_LEFT, path=path)
     if number in _NO_SPACE or any(f"errno = {code}," in words for code in _NO_SPACE):
         return DiskFullError(
             "{path}: the disk or its quota is full. Free some space or take another disk", path=path

@@ -8,7 +8,7 @@ from typing import cast
 from app.interrupts import was_interrupted
 from config.durable_files import file_in_use, is_in_use
 from messages.i18n import N_
-from messages.message import Message, MessageError, message
+from messages.message import Message, MessageError, lacking_resource, message
 
 
 class RunError(MessageError):
@@ -99,6 +99,8 @@ def unreadable(path: Path, error: OSError) -> RunError:
     """Error for a file that the operating system refuses to open."""
     if is_in_use(error, path):
         return in_use(path)
+    if lacking := lacking_resource(error):
+        return RunError("{path}: {fault}", path=path, fault=lacking)
     return RunNotFoundError(
         "{path}: cannot be read ({reason}). Check its rights", path=path, reason=error.strerror
     )

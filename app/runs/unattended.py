@@ -44,8 +44,10 @@ def read_notes(directory: Path) -> dict[Path, UnattendedRun]:
 
     Notes on runs that are gone are removed.
     """
-    notes = {}
-    for path in _notes_folder().glob(f"*{_SUFFIX}"):
+    notes, paths = {}, list[Path]()
+    with contextlib.suppress(OSError):
+        paths = list(_notes_folder().glob(f"*{_SUFFIX}"))
+    for path in paths:
         with contextlib.suppress(OSError, msgspec.MsgspecError):
             run = msgspec.json.decode(path.read_bytes(), type=UnattendedRun)
             if run.path and not Path(run.path).exists():

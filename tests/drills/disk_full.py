@@ -94,7 +94,7 @@ def may_mount() -> bool:
         return False
     with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as place:
         try:
-            with _small_disk(Path(place)):
+            with small_disk(Path(place)):
                 return True
         except (OSError, subprocess.CalledProcessError):
             return False
@@ -134,7 +134,7 @@ def bench_in(place: Path, way: str) -> Iterator[Bench]:
     folder, refuge, temporary = place / "runs", place / "refuge", place / "refuge" / "tmp"
     folder.mkdir()
     temporary.mkdir(parents=True)
-    disk = contextlib.nullcontext() if way == "limit" else _small_disk(folder)
+    disk = contextlib.nullcontext() if way == "limit" else small_disk(folder)
     options = SimulatedStandOptions(rate_hz=RATE_HZ, seed=1, table_drift_m_per_s=1e-3)
     files = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
     data_home, temp = environment("XDG_DATA_HOME", str(refuge)), environment("TMPDIR", str(temporary))
@@ -146,10 +146,10 @@ def bench_in(place: Path, way: str) -> Iterator[Bench]:
 
 
 @contextlib.contextmanager
-def _small_disk(folder: Path) -> Iterator[None]:
-    size = f"size={DISK_MB}m"
+def small_disk(folder: Path, options: str = f"size={DISK_MB}m") -> Iterator[None]:
+    """Mount a disk in memory with such options of tmpfs on a folder."""
     subprocess.run(
-        ["mount", "-t", "tmpfs", "-o", size, "tmpfs", str(folder)], check=True, capture_output=True
+        ["mount", "-t", "tmpfs", "-o", options, "tmpfs", str(folder)], check=True, capture_output=True
     )
     try:
         yield

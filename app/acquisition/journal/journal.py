@@ -24,13 +24,13 @@ from app.acquisition.journal.records import JournalHeader, Known, Mark, Metadata
 from app.acquisition.pullback.plan import PullbackMeasurement
 from app.acquisition.stream.connection import RawRead
 from app.acquisition.stream.live_stream import DecodedRead
-from app.runs.disk import is_disk_full
+from app.runs.disk import NO_FILE_LEFT, is_disk_full, lacks_files
 from app.runs.journal import RecordKind, encode_record
 from app.runs.lock import LockHeldError
 from drivers.clock import TimeBase
 from drivers.host_time import host_ns
 from messages.i18n import N_
-from messages.message import EMPTY, Message, message
+from messages.message import EMPTY, Message, lacking_resource, message
 
 _log = logging.getLogger(__name__)
 
@@ -224,6 +224,10 @@ def create_journal(path: Path, header: JournalHeader, fallback_folders: Sequence
 
 
 def _error(path: Path, error: OSError) -> JournalError:
+    if lacking := lacking_resource(error):
+        return JournalError("{path}: {fault}", path=path, fault=lacking)
+    if is_disk_full(error) and lacks_files(path.parent):
+        return JournalFullError(NO_FILE_LEFT, path=path)
     if is_disk_full(error):
         return JournalFullError(
             "{path}: the disk is full. Free some space, or record to another disk", path=path

@@ -31,13 +31,26 @@ def exit_with_parent(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:
 
 
 def _leave(_number: int, _frame: object) -> NoReturn:
+    _discard_stderr()
     raise SystemExit(1)
+
+
+def _discard_stderr() -> None:
+    """Discard what is written to stderr: that a process was cut off is no news.
+
+    Numba ends a process with a report where the exit comes while it loads a library.
+    """
+    sys.stderr = io.StringIO()
+    with contextlib.suppress(OSError):
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, 2)
+        os.close(null)
 
 
 def _end_with_owner(lifeline: PipeEnd, grace_s: float) -> None:
     with contextlib.suppress(EOFError, OSError):
         lifeline.recv()
-    sys.stderr = io.StringIO()  # that it was cut off is no news
+    _discard_stderr()
     thread = threading.main_thread().ident
     if thread is not None and hasattr(signal, "pthread_kill"):  # wakes it, whatever it waits for
         signal.pthread_kill(thread, signal.SIGTERM)

@@ -20,7 +20,7 @@ from app.runs.saved_analyses import Document, SavedAnalysis, metadata_hash, read
 from app.runs.schema import ENDED
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError
-from messages.message import Message, MessageError, message
+from messages.message import Message, MessageError, lacking_resource, message
 
 
 class AnalysisTask(msgspec.Struct, frozen=True):
@@ -73,6 +73,8 @@ def error_message(error: Exception) -> Message:
     """Message of an error with a run; a fault of the program itself is named one."""
     if isinstance(error, MessageError):
         return error.message
+    if lacking := lacking_resource(error):
+        return lacking
     if isinstance(error, OSError | ConfigError):
         return message("{error}", error=one_line(error))
     return internal_error(error)
