@@ -253,6 +253,23 @@ def test_a_file_that_cannot_be_read_is_kept_aside(tmp_path, writer, damage):
     assert len(open_run(path)) == recovered.samples > 1000
 
 
+def test_a_torn_file_that_its_journal_does_not_name_is_found_by_the_uuid_in_it(tmp_path, writer):
+    """A power cut took what was written last: the name in the journal, and the beginning of the run file."""
+    path = interrupted(tmp_path, writer)
+    (journal,) = tmp_path.glob("*.journal")
+    records = [record for record in read_journal(journal) if b'"Named"' not in record.data]
+    journal.write_bytes(
+        MAGIC + b"".join(encode_record(record.data, record.arrival_ns, record.kind) for record in records)
+    )
+    torn = bytes(96) + path.read_bytes()[96:]
+    path.write_bytes(torn)
+    (recovered,) = recover_folder(tmp_path)
+    assert recovered.run == str(path)
+    assert (tmp_path / f"{path.name}.before-recovery").read_bytes() == torn
+    assert [one.name for one in tmp_path.glob("*.h5")] == [path.name]
+    assert len(open_run(path)) == recovered.samples > 1000
+
+
 def test_a_file_with_other_samples_is_kept_aside(tmp_path, writer, monkeypatch):
     path = interrupted(tmp_path, writer)
     monkeypatch.setattr(recovery, "contains_all_samples", lambda *_: False)
