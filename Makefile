@@ -18,7 +18,7 @@ FIRMWARE_PACKAGES := gcc-avr avr-libc gcc libc6-dev libsimavr-dev libelf-dev
 DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 
 # What logs the system calls that the drill of a power cut rebuilds disks from, and mounts a disk that hangs.
-TEST_PACKAGES := strace bindfs
+TEST_PACKAGES := strace bindfs gcc libc6-dev
 
 .PHONY: audit licences wheel drill-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
@@ -153,6 +153,8 @@ drill: setup drill-tools
 	$(BIN)/python -m tests.drills.hostile_texts --count 20000
 	$(BIN)/python -m tests.drills.oversized_files
 	$(BIN)/python -m tests.drills.hostile_wire
+	$(BIN)/python -m tests.drills.resources
+	$(BIN)/python -m tests.drills.clock
 	$(BIN)/python -m tests.drills.hostile_bytes --megabytes 1000 --frames 1000000
 
 peers: setup
@@ -178,7 +180,7 @@ $(VENV)/tools/.ready:
 	@touch $@
 
 audit: $(VENV)/tools/.ready
-	$(VENV)/tools/bin/pip-audit --require-hashes --disable-pip --requirement requirements.lock
+	$(VENV)/tools/bin/pip-audit --strict --require-hashes --disable-pip --requirement requirements.lock
 
 licences: setup $(VENV)/tools/.ready
 	@{ printf '# Licences\n\nOf the packages of `requirements.lock`, those for development included, as they state them. Made by `make licences`.\n\n'; \

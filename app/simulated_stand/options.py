@@ -64,7 +64,7 @@ _LIMITS = {
     "decay_s": (0.05, 3600.0), "recentre_s": (0.05, 3600.0), "count": (0, 1_000_000),
     "recentre_every": (0, 1_000_000), "plate_offset_m": (-0.1, 0.1), "table_clip_m": (1e-6, 1.0),
     "early_release_m": (1e-4, PULLBACK_MAX_M),
-    "relative_clip_m": (1e-6, 1.0), "rate_error": (-0.5, 1.0), "first_sequence": (0, (1 << 32) - 1),
+    "relative_clip_m": (1e-6, 1.0), "rate_error": (-0.999, 9.0), "first_sequence": (0, (1 << 32) - 1),
     "lag_s": (-1.0, 1.0), "first_time_s": (0.0, 1e6), "tcp_port": (0, 65535), "start_at_unix_s": (0.0, 1e11),
 }  # fmt: skip
 """Least and largest value of each option: beyond them it is another unit by mistake, or no stand."""

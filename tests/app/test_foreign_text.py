@@ -7,6 +7,7 @@ import re
 import zipfile
 from pathlib import Path
 
+import numpy as np
 import openpyxl
 import pytest
 from markdown_it import MarkdownIt
@@ -20,7 +21,11 @@ from analysis.campaign.series import SeriesKey
 from analysis.motion.two_mass import TwoMassParameters
 from app.cli import output
 from app.presenters.base import Chip, Tone
+from app.presenters.runs.state import Overlay, Trace
+from app.qt.runs.preview import RunsPreview
+from app.qt.theme import Theme
 from app.qt.widgets.inputs import ask
+from app.qt.widgets.plots import PlotStack
 from app.qt.widgets.text import button_text, label, markup, plain_text, set_tool_tip, show_chip
 from app.reports.table.files import as_text, write_workbook
 from app.reports.table.text import TableContent
@@ -185,6 +190,34 @@ def test_widgets_show_text_as_it_is(qtbot, poison):
     button = QPushButton(button_text(poison))
     qtbot.addWidget(button)
     assert button.shortcut().isEmpty()
+
+
+@poisons
+def test_plots_show_text_as_it_is(qapp, qtbot, poison):
+    """Titles, readout and the title of an axis: what pyqtgraph takes for HTML."""
+    stack = PlotStack(Theme(qapp, Qt.ColorScheme.Light), ((poison, "text"),))
+    qtbot.addWidget(stack)
+    seen = folded(show_control_characters(poison))
+    (plot,) = stack.plots
+    stack.set_readout(0, poison)
+    stack.set_time_title(poison)
+    stack.restyle()
+    for item in (plot.title, plot.readout, plot.bottom):
+        shown = item.labelString() if item is plot.bottom else item.text
+        assert as_html(shown) == seen
+
+
+@poisons
+def test_the_legend_of_runs_shows_text_as_it_is(qapp, qtbot, poison):
+    preview = RunsPreview(Theme(qapp, Qt.ColorScheme.Light))
+    qtbot.addWidget(preview)
+    seen, line = folded(show_control_characters(poison)), np.zeros(3)
+    trace = Trace(poison, np.arange(3.0), line, line)
+    preview.show_overlay(Overlay((trace, trace)))
+    assert as_html(QLabel.text(preview._names)).count(seen) == 2
+    preview.show_overlay(Overlay((trace,)))
+    assert preview._names.textFormat() is Qt.TextFormat.PlainText
+    assert folded(QLabel.text(preview._names)) == seen
 
 
 def as_html(text: str) -> str:

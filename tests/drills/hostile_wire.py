@@ -2,9 +2,9 @@
 
 A proxy stands between a simulated stand and the engine, and changes what comes while a run is recorded:
 frames twice, shuffled, one in a thousand, with random number or time and a right checksum, a megabyte instead
-of them, the identity of another device, nothing at all. The stand itself sends at double or half the rate
-that it states. Each run must go on or end with one line, no good row be one that was never sent, and the
-engine's memory stay bounded.
+of them, the identity of another device, nothing at all. The stand itself sends at double or half, ten times or
+a thousandth of the rate that it states. Each run must go on or end with one line, no good row be one that was
+never sent, and the engine's memory stay bounded.
 """
 
 import argparse
@@ -72,7 +72,7 @@ WIRES: dict[str, Change] = {
     "thousandth": lambda frames, chance: [frame for frame in frames if chance.random() < 1e-3],
     "mute": lambda _frames, _: [],
 }
-RATES = {"double rate": 1.0, "half rate": -0.5}
+RATES = {"double rate": 1.0, "half rate": -0.5, "tenfold rate": 9.0, "thousandth rate": -0.999}
 ADDRESSES = ("silent port", "unknown name")
 WAYS = (*WIRES, *RATES, *ADDRESSES)
 

@@ -1,4 +1,5 @@
 import enum
+import errno
 import gettext
 import pickle
 from pathlib import Path
@@ -100,3 +101,16 @@ def test_options_of_the_command_line_become_controls_of_a_window():
     shown = replace_options(fault, {"--skip": message("Lines skipped")})
     assert str(shown) == "'--skip' is not a number: add Lines skipped 3"
     assert replace_options(fault, {}) == fault
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (OSError(errno.EMFILE, "Too many open files"), "too many files are open: close other programs"),
+        (OSError(errno.ENFILE, "Too many open files in system"), "too many files are open"),
+        (OSError(errno.ENOMEM, "Cannot allocate memory"), "too little memory left: close other programs"),
+        (MemoryError(), "too little memory left: close other programs"),
+    ],
+)
+def test_what_this_computer_lacks_is_told_with_the_remedy(error, said):
+    assert said in str(message_of(error))

@@ -148,6 +148,7 @@ class PlotStack(QFrame):
         QPixmapCache.setCacheLimit(_CACHE_KB)
         self._theme = theme
         self._titles = list(titles)
+        self._time_title = ""
         self._format_point = format_point
         self.pointer: tuple[int, QPointF] | None = None
         """Row of the plot under the pointer, and the place there in its units."""
@@ -180,7 +181,7 @@ class PlotStack(QFrame):
         for plot, (text, token) in zip(self.plots, self._titles, strict=True):
             _write(plot.title, text, getattr(tokens, token))
             plot.restyle(tokens)
-        self.set_time_title(self.plots[-1].bottom.labelText)
+        self.set_time_title(self._time_title)
 
     def set_title(self, row: int, text: str) -> None:
         _, token = self._titles[row]
@@ -194,7 +195,10 @@ class PlotStack(QFrame):
         self._canvas.ci.layout.setRowMaximumHeight(3 * row + 1, _ENDLESS if shown else 0.0)
 
     def set_time_title(self, text: str) -> None:
-        self.plots[-1].bottom.setLabel(text, **{"color": self._theme.tokens.muted, "font-size": "11px"})
+        self._time_title = text
+        self.plots[-1].bottom.setLabel(
+            markup(text), **{"color": self._theme.tokens.muted, "font-size": "11px"}
+        )
 
     def set_time_range(
         self, start_s: float, end_s: float, limits: tuple[float, float] | None = None, *, keep: bool = False

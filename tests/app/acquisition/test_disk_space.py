@@ -45,6 +45,21 @@ def test_a_run_without_room_is_refused_with_figures(disk, tmp_path):
     assert str(check_disk_space(tmp_path, AT_ONCE, DEMAND)) == ""
 
 
+@pytest.mark.parametrize("files", [1, 5])
+def test_a_run_is_refused_where_the_disk_takes_too_few_files(disk, tmp_path, monkeypatch, files):
+    disk(DEMAND.of_run(AT_ONCE))
+    monkeypatch.setattr(disk_space, "free_files", lambda _: files)
+    with pytest.raises(DiskSpaceError, match=f"takes only {files} more files, and this run 6. Remove some"):
+        check_disk_space(tmp_path, AT_ONCE, DEMAND)
+
+
+@pytest.mark.parametrize("files", [None, 0, 6])
+def test_a_disk_that_knows_no_number_of_files_is_recorded_to(disk, tmp_path, monkeypatch, files):
+    disk(DEMAND.of_run(AT_ONCE))
+    monkeypatch.setattr(disk_space, "free_files", lambda _: files)
+    assert str(check_disk_space(tmp_path, AT_ONCE, DEMAND)) == ""
+
+
 def test_a_long_wait_without_room_is_said_at_arming(disk, tmp_path):
     disk(DEMAND.of_run(PULLBACK) + 300 * DEMAND.journal_bytes_per_s)
     assert "if the release comes within 5 minutes" in str(check_disk_space(tmp_path, PULLBACK, DEMAND))

@@ -1,6 +1,7 @@
 """Tasks in a process of their own: answers, errors in words, progress, cancelling, and a clean end."""
 
 import ctypes
+import errno
 import multiprocessing
 import os
 import signal
@@ -314,3 +315,21 @@ def test_a_shared_process_that_died_while_idle_is_replaced() -> None:
     finally:
         answers.worker.close()
         pool.close()
+
+
+def test_a_task_whose_process_does_not_start_fails_and_is_not_waited_for(monkeypatch):
+    worker = Worker()
+    answers = Answers(worker)
+    with monkeypatch.context() as lacking:
+        lacking.setattr("socket.socketpair", _no_pipe)
+        lacking.setattr(os, "pipe", _no_pipe)
+        answers.submit(tell_process)
+        assert not worker.is_busy
+        worker.poll()
+    (failure,) = answers.failed
+    assert "too many files are open" in str(failure.message)
+    worker.close()
+
+
+def _no_pipe(*_: object) -> None:
+    raise OSError(errno.EMFILE, "Too many open files")

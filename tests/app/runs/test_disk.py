@@ -36,6 +36,22 @@ def test_an_export_that_is_open_in_another_program_is_left_as_it_is(tmp_path, mo
     assert [one.name for one in tmp_path.iterdir()] == ["table.csv"]
 
 
+def test_a_disk_without_room_for_another_file_is_told_from_a_full_one(tmp_path, monkeypatch):
+    full = OSError(errno.ENOSPC, "No space left on device")
+    for files, said in (
+        (1, "takes no more files. Remove some files"),
+        (1000, "the disk or its quota is full"),
+    ):
+        monkeypatch.setattr(disk, "free_files", lambda _, files=files: files)
+        assert said in str(storage_error(tmp_path / "run.h5", full))
+
+
+def test_too_many_open_files_are_no_fault_of_the_folder(tmp_path):
+    error = storage_error(tmp_path / "run.h5", OSError(errno.EMFILE, "Too many open files"))
+    assert "allow more open files (ulimit -n 256)" in str(error)
+    assert "rights" not in str(error)
+
+
 def test_a_folder_is_writable_if_a_file_can_be_made_in_it(tmp_path):
     assert is_writable(tmp_path)
     assert not is_writable(tmp_path / "absent")
