@@ -8,6 +8,8 @@ from messages.i18n import N_
 from messages.message import Message, message
 
 COVERAGE_FACTOR_95 = 1.959963984540054  # coverage factor of a 95 % interval of a normal distribution
+COVERAGE_FACTOR = 2.0
+"""k of expanded uncertainties (JCGM 100, 6.2)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +26,11 @@ class Quantity:
         """Quantity with a normal distribution: 95 % lie within 1.959964 standard uncertainties."""
         half = COVERAGE_FACTOR_95 * standard_uncertainty
         return cls(value, standard_uncertainty, (value - half, value + half), unit)
+
+    @property
+    def expanded_uncertainty(self) -> float:
+        """U = k u with k = 2: a coverage of about 95 % where the distribution is normal."""
+        return COVERAGE_FACTOR * self.standard_uncertainty
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,12 +68,14 @@ class PooledSeries:
         return f"<table><tr>{head}</tr>{rows}</table>"
 
 
-def pool(paths: str | PathLike[str] | Iterable[str | PathLike[str]], *, jobs: int | None = 1) -> PooledSeries:
+def pool(paths: str | PathLike[str] | Iterable[str | PathLike[str]]) -> PooledSeries:
     """Pool runs, given as files and folders, by series.
 
-    The newest result that is kept in a run is taken if it still stands, else the run is identified, by `jobs`
-    processes (None: one for each core). Raises RunError.
+    The newest result that is kept in a run is taken if it still stands, else the run is identified.
+    `slipstand analyze FOLDER --save` identifies many runs by all processors beforehand. Raises RunError where
+    none of the runs gives a result.
     """
     given = [Path(path) for path in ([paths] if isinstance(paths, (str, PathLike)) else paths)]
-    runs = collect_runs(given, CollectOptions(executor=ExecutorOptions(jobs=jobs)))
+    runs = collect_runs(given, CollectOptions(executor=ExecutorOptions(jobs=1)))
+    runs.require_result()
     return PooledSeries(TableContent.of_runs(runs, campaign_command("table", given)))

@@ -126,6 +126,14 @@ class Result(Mapping[str, Quantity]):
                 gtc.set_correlation(float(matrix[row, column]), one, numbers[column])
         return dict(zip(names, numbers, strict=True))
 
+    def to_uncertainties(self) -> dict[str, Any]:
+        """Quantities as correlated numbers of uncertainties, by name. Raises ImportError without it."""
+        package = _extra("uncertainties", "to_uncertainties")
+        names, matrix = self.correlation()
+        values = [(self[name].value, self[name].standard_uncertainty) for name in names]
+        numbers = package.correlated_values_norm(values, matrix, tags=names)
+        return dict(zip(names, numbers, strict=True))
+
     def plot(self) -> "Figure":
         """Figure of matplotlib: record, simulation and residuals."""
         from app.reports.figures.record_figure import figure_title, record_figure

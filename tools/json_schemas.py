@@ -52,8 +52,14 @@ def record(required: Schema, others: Schema | None = None, description: str = ""
 
 
 INTERVAL: Final = optional({"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2})
+EXPANDED: Final = {
+    "expanded_uncertainty": optional(NUMBER)
+    | {"description": "Standard uncertainty times the coverage factor; absent in older results."},
+    "coverage_factor": NUMBER,
+}
 QUANTITY: Final = record(
     {"value": NUMBER, "standard_uncertainty": optional(NUMBER), "interval_95": INTERVAL, "unit": TEXT},
+    EXPANDED,
     description="A value with standard uncertainty and 95 % interval, in an SI unit; 1 is a pure number.",
 )
 RESULT: Final = {"anyOf": [QUANTITY, TEXT, YES]}
@@ -232,7 +238,8 @@ TABLE_MASS: Final = record(
 )
 POOLED: Final = record(
     {"value": NUMBER, "standard_uncertainty": NUMBER, "interval_95": INTERVAL, "unit": TEXT},
-    {
+    EXPANDED
+    | {
         "runs": COUNT,
         "repeatable": NUMBER,
         "common": keyed(NUMBER, "Standard uncertainties that runs share, by source."),

@@ -20,9 +20,7 @@ def report(options: ReportOptions) -> None:
     head = _head(options)
     target = out.output_file(options.output, options.force, (".pdf",))
     runs = load_campaign(options.paths, options.jobs, exclude=options.exclude)
-    if not runs.runs:
-        fault = runs.failures[0].error if runs.failures else "all are left out"
-        raise CommandError(f"none of the runs gives a result: {fault}")
+    runs.require_result()
     content = TableContent.of_runs(runs, _reproduce(options, head))
     made = build_report(runs, content, head)
     write_report(made, target, replace=options.force)

@@ -11,7 +11,7 @@ import numpy as np
 
 from analysis.identification import Identification, ModelSelection, MonteCarlo
 from analysis.plate.friction import PlateFriction
-from analysis.quantities import BudgetLine, Quantity, ResultWarning, parse_source
+from analysis.quantities import COVERAGE_FACTOR, BudgetLine, Quantity, ResultWarning, parse_source
 from analysis.record import Record, StandMasses
 from analysis.uncertainty import unstated_gain_warnings
 from messages.i18n import N_
@@ -157,9 +157,13 @@ def read_quantity(document: dict[str, Any]) -> Quantity:
 
 
 def quantity_document(quantity: Quantity) -> dict[str, Any]:
-    """A quantity as in `results`; an interval that is not finite is null."""
+    """A quantity as in `results`; what is not finite is null."""
     document: dict[str, Any] = json_values(quantity)
-    return document | {"interval_95": None if None in document["interval_95"] else document["interval_95"]}
+    interval = None if None in document["interval_95"] else document["interval_95"]
+    expanded = json_values(quantity.expanded_uncertainty)
+    return document | {
+        "interval_95": interval, "expanded_uncertainty": expanded, "coverage_factor": COVERAGE_FACTOR,
+    }  # fmt: skip
 
 
 def _or_nan(value: float | None) -> float:

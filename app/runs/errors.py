@@ -78,6 +78,10 @@ class UnsuitableRunError(RunError):
     """A valid run that does not hold what the caller needs."""
 
 
+class NoResultError(RunError):
+    """None of several runs gives a result."""
+
+
 class ImportFileError(RunError):
     """A foreign record cannot be read: names file, row or column, and remedy."""
 

@@ -1,84 +1,31 @@
-"""Each command on a page is one of the program; those that need no device are run as they stand."""
+"""Each command on a page is one of the program; those without a device are run, and outputs compared."""
 
+import contextlib
+import io
 import re
-import shlex
-from collections.abc import Iterator
+import shutil
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
 import pytest
 import typer
-from reports_kit import write_run
 from typer.core import TyperGroup
 
-from analysis.synthetic import Truth, simulate_readings
 from app.cli.commands import app
 from app.cli.errors import CommandError
+from tools import page_commands
+from tools.page_commands import COMPARED_ELSEWHERE, MADE, PAGES, PLACEHOLDER, ROOT, PageCommand, is_run
 
-ROOT = Path(__file__).resolve().parents[2]
-MADE = {"options.md", "configuration.md"}  # from the program itself
-PAGES = [
-    *(page for page in sorted((ROOT / "docs").rglob("*.md")) if not {"_outside", "_build"} & {*page.parts}),
-    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "firmware/README.md", "recordings/README.md")),
-]
-FENCE = re.compile(r"^ *```.*?\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
-INLINE = re.compile(r"`(slipstand [^`]+)`")
-PLACEHOLDER = re.compile(r"\[?[A-Z][A-Z.|\\/-]*(\.h5|\.csv)?\]?(\.\.\.)?")
-NO_DEVICE = {
-    "analyze", "audit", "doctor", "edit", "export", "figures", "import", "plan", "recover", "report", "runs",
-    "simulate", "table", "trash",
-}  # fmt: skip
-"""Commands that are run. Others need a device, a display or no end; `device list` is run too."""
-NOT_RUN = {
-    "slipstand import *.csv --table u1 -o runs/",
-    "slipstand analyze bare.h5 loaded.h5 --kind one-mass --added-mass 20 --added-mass-uncertainty 0.01",
-}
-"""Of other files than the stage has; tests of the commands run them."""
 RUN_APART = {"docs/how-to/sign-a-report.md", "docs/how-to/make-figures.md"}
 """Pages whose commands draw for long: their first one is run."""
+SHELL = {
+    "cp", "dask", "make", "pip", "python", "py", "slipstand", "source", "sudo", "t=$(($(date",
+    ".venv\\Scripts\\python", ".venv\\Scripts\\slipstand",
+}  # fmt: skip
+"""First words of the lines of blocks without a language."""
 
 
-class PageCommand(NamedTuple):
-    page: str
-    line: str
-    is_fenced: bool
-
-    @property
-    def words(self) -> list[str]:
-        return shlex.split(self.line.replace("\\|", "|"), comments=True)[1:]
-
-    @property
-    def is_run(self) -> bool:
-        """Whether it needs no device and has values in all its places."""
-        words = self.words
-        is_complete = not any(word == "..." or PLACEHOLDER.fullmatch(word) for word in words)
-        is_whole = self.is_fenced or "--series" in words or any("." in word or "/" in word for word in words)
-        by_itself = words in (["device", "list"], ["runs"], ["doctor"], ["audit"], ["recover"])
-        return (
-            is_complete and self.line not in NOT_RUN and ((words[0] in NO_DEVICE and is_whole) or by_itself)
-        )
-
-
-def page_commands() -> Iterator[PageCommand]:
-    """Commands of fenced blocks and of inline code, in the order of each page."""
-    for page in PAGES:
-        if page.name in MADE:
-            continue
-        name, text = page.relative_to(ROOT).as_posix(), page.read_text("utf-8")
-        places = [
-            (block.start(), line.strip(), True)
-            for block in FENCE.finditer(text)
-            for line in block[1].replace("\\\n", " ").splitlines()
-            if line.strip().startswith("slipstand ")
-        ]
-        plain = FENCE.sub(lambda block: " " * len(block[0]), text)
-        places += [(found.start(), found[1], False) for found in INLINE.finditer(plain)]
-        for _, line, is_fenced in sorted(places, key=lambda place: place[0]):
-            yield PageCommand(name, " ".join(line.split()).removesuffix(" &"), is_fenced)
-
-
-COMMANDS = list(page_commands())
+COMMANDS = [command for page in PAGES if page.name not in MADE for command in page_commands.commands_of(page)]
 
 
 def value_for(param: Any, word: str) -> str:
@@ -120,7 +67,7 @@ def parse(words: list[str]) -> None:
 @pytest.mark.parametrize("page", sorted({command.page for command in COMMANDS}))
 def test_commands_of_a_page_are_those_of_the_program(page: str) -> None:
     for command in COMMANDS:
-        if command.page == page:
+        if command.page == page and not command.is_python:
             try:
                 parse(command.words)
             except (CommandError, typer.BadParameter, ValueError) as error:
@@ -142,45 +89,99 @@ def test_a_command_that_is_none_is_noticed() -> None:
 def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that pages name."""
     folder = tmp_path_factory.mktemp("stage")
-    (folder / "recordings").mkdir()
-    for name, series in (
-        ("20261121T141210_1FFM0_003", "1FFM0"),
-        ("20261121T141410_1SSM0_001", "1SSM0"),
-        ("20261121T141610_1SSLM0_001", "1SSLM0"),
-    ):
-        write_run(folder / "recordings" / f"{name}.h5", series)
-    times = zip(*simulate_readings(Truth(rate_hz=200.0)), strict=True)
-    rows = np.array(list(times)) * [1.0, 1e3, 1e3]
-    np.savetxt(folder / "test.csv", rows, "%.6f", ",", header="t,u1,rel", comments="")
+    page_commands.make_stage(folder)
     return folder
 
 
 def run_pages() -> list[str]:
-    return sorted({command.page for command in COMMANDS if command.is_run})
+    return sorted({command.page for command in COMMANDS if is_run(command)})
+
+
+def printed_by(command: PageCommand, slipstand: Any) -> str:
+    """What a command or a block of Python prints; it has to succeed."""
+    if command.is_python:
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            exec(compile(command.line, command.page, "exec"), {"__name__": "__main__"})
+        return said.getvalue()
+    words = [
+        file
+        for word in command.words
+        for file in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
+    ]
+    outcome = slipstand(*words)
+    assert outcome.code == 0, f"{command.page}: {command.line}: {outcome.err}"
+    assert "error:" not in outcome.err
+    return str(outcome.err + outcome.out)
 
 
 @pytest.mark.parametrize("page", run_pages())
-def test_commands_of_a_page_run(
+def test_commands_of_a_page_run_and_print_what_it_shows(
     page: str, stage: Path, slipstand: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """In their order, in a folder of their own, with the exit code of success and no word of a fault."""
-    for name in ("recordings", "test.csv"):
-        source = stage / name
-        for file in [source] if source.is_file() else sorted(source.iterdir()):
-            place = tmp_path / file.relative_to(stage)
-            place.parent.mkdir(exist_ok=True)
-            place.write_bytes(file.read_bytes())
-    (tmp_path / "run.h5").write_bytes(next((tmp_path / "recordings").glob("*1FFM0*")).read_bytes())
+    shutil.copytree(stage, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", page_commands.COLUMNS)
     monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path / "recordings"))
     monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path / "settings"))
-    commands = [command for command in COMMANDS if command.page == page and command.is_run]
+    commands = [command for command in COMMANDS if command.page == page and is_run(command)]
     for command in commands[:1] if page in RUN_APART else commands:
-        words = [
-            file
-            for word in command.words
-            for file in (sorted(map(str, Path().glob(word))) if "*" in word else [word])
-        ]
-        outcome = slipstand(*words)
-        assert outcome.code == 0, f"{page}: {command.line}: {outcome.err}"
-        assert "error:" not in outcome.err
+        printed = printed_by(command, slipstand).splitlines()
+        for shown in command.shown:
+            found = page_commands.faults(shown.lines, printed)
+            assert found == [], f"{page}: {command.line}: run python -m tools.page_commands"
+
+
+def test_every_shown_output_is_compared() -> None:
+    """By the test above, or by the one that the list names."""
+    for command in COMMANDS:
+        if command.shown:
+            assert is_run(command) or command.line in COMPARED_ELSEWHERE, f"{command.page}: {command.line}"
+            assert command.page not in RUN_APART
+    for reason in COMPARED_ELSEWHERE.values():
+        test = reason.rpartition(": ")[2]
+        assert "page_commands" in (ROOT / test).read_text("utf-8"), test
+    assert {command.line for command in COMMANDS if command.shown} >= COMPARED_ELSEWHERE.keys()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_what_is_no_command_names_its_language(page: Path) -> None:
+    """So that no output stands on a page without being compared, and no command without being run."""
+    text = page.read_text("utf-8")
+    for _, _, language, contents in page_commands.blocks(text):
+        lines = contents.replace("\\\n", " ").splitlines()
+        others = {line.split()[0] for line in lines if line.strip() and not line.lstrip().startswith("#")}
+        assert language or others <= SHELL, (
+            f"{page.name}: name the language of the block with {others - SHELL}"
+        )
+    assert not re.search(r"^    slipstand ", text, re.MULTILINE), "put commands into a block"
+
+
+def test_a_page_that_shows_something_else_is_noticed() -> None:
+    printed = [
+        "wrote /tmp/one/a.h5",
+        "f_d   0.10005 ± 0.00022",
+        "T     320.01 ms",
+        "",
+        "slipstand 0.1.0 (abc123)",
+    ]
+    shown = ["wrote a.h5", "f_d 0.10006 ± 0.00022", "...", "slipstand 9.9.9 (def456)"]
+    assert page_commands.faults(shown, printed) == []
+    assert page_commands.faults(["wrote b.h5", "..."], printed) == ["not printed: 'wrote b.h5'"]
+    assert page_commands.faults(["...", "f_d 0.10008 ± 0.00022", "..."], printed)
+    assert page_commands.faults(["...", "T 320.01 s", "..."], printed)
+    (fault,) = page_commands.faults(["...", "T 320.01 ms"], printed)
+    assert fault.startswith("lines are left out at the end")
+    (fault,) = page_commands.faults(["T 320.01 ms", "..."], printed)
+    assert fault.startswith("lines are left out before")
+    assert page_commands.faults(["f_d 0.2 ± 0.1"], printed, exactly=False) == []
+
+
+def test_an_output_is_written_anew() -> None:
+    text = "```output\nf_d 0.2\n...\n```\n"
+    shown = page_commands.Shown(10, 22, "", ["f_d 0.2", "..."])
+    assert page_commands.rewritten(text, shown, ["other", "f_d 0.1"]) == text.replace("0.2", "0.1")
+    assert "\nother\nf_d 0.1\n```" in page_commands.rewritten(
+        text, shown._replace(lines=[]), ["other", "f_d 0.1"]
+    )

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from io import StringIO
 
 import numpy as np
 import pytest
@@ -98,6 +99,20 @@ def test_a_run_that_is_not_there_is_told_in_one_line(tmp_path) -> None:
         api.read_run(tmp_path / "absent.h5")
 
 
+def test_runs_without_any_result_are_no_table(tmp_path, slipstand) -> None:
+    (tmp_path / "broken.h5").write_text("no run")
+    with pytest.raises(api.RunError, match=r"none of the runs gives a result: .*broken\.h5"):
+        api.pool(tmp_path)
+    with pytest.raises(api.RunError, match=r"absent\.h5: there is no such file"):
+        api.pool(tmp_path / "absent.h5")
+    slipstand("simulate", "--series", "1FFM0", "-o", tmp_path / "run.h5")
+    pooled = api.pool(str(tmp_path))
+    assert len(pooled.campaign.rows) == 1
+    ((run, reason),) = pooled.failures
+    assert run == str(tmp_path / "broken.h5")
+    assert reason.startswith("broken.h5 is not an HDF5 file")
+
+
 def test_results_are_shown_as_text_table_and_figure(result) -> None:
     lines = str(result).splitlines()
     assert lines[0].startswith("f_d ")
@@ -146,6 +161,40 @@ def test_budgets_go_to_gtc(result) -> None:
     ]
     variance = shares[0] ** 2 + shares[1] ** 2 - 2.0 * stated * shares[0] * shares[1]
     assert (gtc.uncertainty(ratio) / gtc.value(ratio)) ** 2 == pytest.approx(variance)
+
+
+@pytest.mark.parametrize(
+    "compute",
+    [
+        lambda known, _: known["friction_dynamic"] / known["pullback_m"],
+        lambda known, functions: functions.sqrt(known["stiffness_n_per_m"]) * known["period_s"],
+        lambda known, functions: functions.exp(-known["damping_n1_per_s"] * known["period_s"]),
+    ],
+    ids=["correlated ratio", "sqrt", "exp"],
+)
+def test_uncertainties_and_gtc_compute_alike(result, compute) -> None:
+    gtc, functions = pytest.importorskip("GTC"), pytest.importorskip("uncertainties.umath")
+    ours, theirs = compute(result.to_uncertainties(), functions), compute(result.to_gtc(), gtc)
+    assert ours.nominal_value == pytest.approx(gtc.value(theirs), rel=1e-12)
+    assert ours.std_dev == pytest.approx(gtc.uncertainty(theirs), rel=1e-6)
+
+
+def test_the_log_decrement_of_damping_and_period_is_the_fitted_one(result) -> None:
+    """A product of two results has the uncertainty that the fit gives it, by the stated correlation."""
+    pytest.importorskip("uncertainties")
+    numbers = result.to_uncertainties()
+    product = numbers["damping_n1_per_s"] * numbers["period_s"]
+    fitted = result["log_decrement"]
+    assert product.nominal_value == pytest.approx(fitted.value, rel=1e-9)
+    assert product.std_dev == pytest.approx(fitted.standard_uncertainty, rel=1e-6)
+    assert (product - numbers["log_decrement"]).std_dev < 1e-3 * fitted.standard_uncertainty
+
+
+def test_a_figure_is_drawn_in_its_style_by_a_notebook(result) -> None:
+    drawn = StringIO()
+    result.plot().savefig(drawn, format="svg")
+    assert "IBMPlexSans" in drawn.getvalue()
+    assert "DejaVu" not in drawn.getvalue()
 
 
 def test_one_mass_of_arrays(test) -> None:

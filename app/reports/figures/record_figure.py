@@ -14,6 +14,7 @@ from app.reports.figures.style import (
     PLATE,
     SIMULATION,
     TABLE,
+    StyledFigure,
     decimate_for_print,
     print_style,
     save_figure,
@@ -63,7 +64,7 @@ def record_figure(record: Record, identification: Identification, unit: str = "m
         if read is not None
     ]
     heights = [2.0, 1.2] if curves is not None else [2.0]
-    figure = Figure(figsize=(7.2, 0.4 + sum(heights) * len(panels)), layout="constrained")
+    figure = StyledFigure(figsize=(7.2, 0.4 + sum(heights) * len(panels)), layout="constrained")
     count = len(heights) * len(panels)
     ratios = heights * len(panels)
     every: list[Axes] = list(

@@ -44,6 +44,17 @@ def print_style() -> Iterator[None]:
         yield
 
 
+class StyledFigure(Figure):
+    """Figure that is drawn in the style of printed figures by whoever draws it, as a notebook does.
+
+    Symbols get their typeface when they are drawn.
+    """
+
+    def draw(self, renderer: Any) -> None:
+        with print_style():
+            super().draw(renderer)
+
+
 def new_figure(height_in: float = 2.5) -> tuple[Figure, Axes]:
     figure = Figure(figsize=(COLUMN_IN, height_in), layout="constrained")
     return figure, figure.subplots()

@@ -23,8 +23,8 @@ from app.reports.table.text import (
     table_quantities,
     text_lines,
 )
-from app.runs.analysis_json import warning_documents
-from app.runs.campaign.documents import effect_documents, pooled_document, quantity_document
+from app.runs.analysis_json import quantity_document, warning_documents
+from app.runs.campaign.documents import effect_documents, pooled_document
 from app.runs.disk import atomic_write
 from app.runs.exchange.export_formats import Sheet, csv_cell, escape_latex, write_sheets
 

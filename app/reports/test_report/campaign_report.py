@@ -130,7 +130,7 @@ def _budget(material: CampaignReportInput) -> Iterator[blocks.Block]:
         parts = [
             "" if one is None else typeset(format_uncertainty(one)) for one in (pooled.repeatable, *shares)
         ]
-        expanded = format_uncertainty(shared.COVERAGE_FACTOR * pooled.quantity.standard_uncertainty)
+        expanded = format_uncertainty(pooled.quantity.expanded_uncertainty)
         rows.append([row.label, value, typeset(expanded), *parts])
     note = (
         "Standard uncertainties, and U: expanded uncertainty, a coverage of about 95 %. Repeats reduce the"

@@ -223,7 +223,7 @@ def _interval(row: QuantityDefinition, quantity: Quantity) -> str:
 def _expanded(row: QuantityDefinition, quantity: Quantity) -> str:
     """Expanded uncertainty, k = 2, in the unit of the report."""
     scale = row.unit_at(Place.REPORT, quantity.unit).scale
-    return typeset(format_uncertainty(shared.COVERAGE_FACTOR * quantity.standard_uncertainty * scale))
+    return typeset(format_uncertainty(quantity.expanded_uncertainty * scale))
 
 
 def _budget(found: Identification) -> Iterator[blocks.Block]:

@@ -17,8 +17,6 @@ from app.runs.reader import Fingerprint
 from config.schema import Gauge, Gauges, Stand
 
 NOT_STATED = "not stated"
-COVERAGE_FACTOR: Final = 2.0
-"""Of expanded uncertainties (JCGM 100, 6.2)."""
 
 SIGNATURES: Final = Section("Signatures", [Signatures(["Tested by", "Checked by", "Approved by"])])
 PROCEDURE: Final = Section(

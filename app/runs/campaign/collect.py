@@ -17,6 +17,7 @@ from app.runs.analyze import Progress
 from app.runs.batch.executors import ExecutorOptions, FailedItem, open_executor
 from app.runs.batch.tasks import AnalysisTask, map_runs
 from app.runs.campaign.run_result import CollectedRun, RunDetails, collect_run
+from app.runs.errors import NoResultError
 from app.runs.file_operations import list_trash
 from app.runs.journal import unfinished_journals
 from app.runs.listing import resolve_run_files
@@ -53,10 +54,9 @@ class FailedRun(msgspec.Struct, frozen=True):
     @property
     def reason(self) -> Message:
         """The error, in which the run is named without its folder."""
-        error = self.error
-        if error.values.get("path") != self.run:
-            return error
-        return Message(error.template, error.values | {"path": Path(self.run).name}, error.plural)
+        name, values = Path(self.run).name, self.error.values
+        shown = {key: name if value == self.run else value for key, value in values.items()}
+        return Message(self.error.template, shown, self.error.plural)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -72,6 +72,12 @@ class CollectedRuns:
     simulated: tuple[str, ...] = ()  # paths of all simulated runs that have a result
     is_mixed: bool = False  # whether there are others beside these
     counts_simulated: bool = True  # whether the simulated ones are among `runs`
+
+    def require_result(self) -> None:
+        """Raise NoResultError where no run has a result."""
+        if not self.runs:
+            fault = self.failures[0].error if self.failures else message("all are left out")
+            raise NoResultError("none of the runs gives a result: {fault}", fault=fault)
 
     @property
     def stands(self) -> dict[str, Stand]:

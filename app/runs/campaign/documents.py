@@ -8,7 +8,7 @@ import msgspec
 
 from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.stand_effects import EffectSummary
-from analysis.quantities import Quantity
+from app.runs.analysis_json import quantity_document
 
 Document = dict[str, Any]
 
@@ -38,9 +38,3 @@ def pooled_document(pooled: PooledQuantity) -> Document:
     described: Document = msgspec.to_builtins(replace(pooled, common={})) | {"common": shared}
     described.pop("quantity")
     return quantity_document(pooled.quantity) | described
-
-
-def quantity_document(quantity: Quantity) -> Document:
-    """A quantity as `table --json` gives it."""
-    described: Document = msgspec.to_builtins(quantity)
-    return described | {"interval_95": list(quantity.interval_95)}

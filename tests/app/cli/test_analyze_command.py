@@ -55,7 +55,11 @@ def test_json_is_what_interface_says(slipstand: Any, simulated_run: Path) -> Non
     assert Path(document["run"]).is_absolute()
     assert document["events"]["release_s"] == pytest.approx(1.0, abs=1e-4)
     friction = document["results"]["friction_dynamic"]
-    assert set(friction) == {"value", "standard_uncertainty", "interval_95", "unit"}
+    assert set(friction) == {
+        "value", "standard_uncertainty", "interval_95", "unit", "expanded_uncertainty", "coverage_factor",
+    }  # fmt: skip
+    assert friction["coverage_factor"] == 2.0
+    assert friction["expanded_uncertainty"] == 2.0 * friction["standard_uncertainty"]
     assert friction["interval_95"][0] < friction["value"] < friction["interval_95"][1]
 
 

@@ -1,5 +1,6 @@
 """`slipstand device health` on a device of two counts."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,8 @@ from typing import Any
 import pytest
 from bench_kit import RATE_HZ, Bench
 from cli_kit import assert_one_error_line
+
+from tools import page_commands
 
 
 @pytest.fixture
@@ -34,6 +37,9 @@ def test_both_gauges_are_judged(slipstand: Any, bench: Bench, tmp_path: Path) ->
     assert said.code == 1
     assert "gauge 1 (table): bad" in said.out
     assert "Touch the table" in said.out
+    shown = page_commands.shown_lines("slipstand device health --port /dev/ttyACM0 --protocol csv")
+    printed = re.sub("bad|doubtful", "good", said.out).splitlines()
+    assert page_commands.faults(shown, printed, exactly=False) == [], "\n".join(printed)
 
 
 @pytest.mark.parametrize(

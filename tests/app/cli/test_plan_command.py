@@ -7,6 +7,7 @@ import pytest
 from analysis.plan import PlannedTest, plan
 from app.runs.plan_json import build_planned_test
 from config.files import load_gauges, load_stand, settings_file
+from tools import page_commands
 
 
 @pytest.fixture(autouse=True)
@@ -122,6 +123,10 @@ def test_plan_says_what_the_last_runs_show_and_what_it_costs(slipstand, real_sta
     assert "  second-mode          3 of 3 runs: a second mode at " in said
     assert "  planned with         second-mode; without, f_d would be uncertain by 0.00022" in said
     assert "  one of them          One run gives f_d to 0.2" in said
+    shown = page_commands.shown_lines("slipstand plan --series 1FFM0 --last-runs real-stand")
+    assert page_commands.faults(shown, said.replace(str(real_stand_runs), "real-stand").splitlines()) == [], (
+        said
+    )
 
 
 def test_plan_refuses_a_folder_of_last_runs_that_does_not_exist(slipstand, tmp_path):

@@ -12,6 +12,7 @@ from drivers.port import PortInfo, PortUser
 from drivers.port_probe import LineSettings, PortReport, ProbeOutcome
 from drivers.recognition import Recognition
 from drivers.registry import find_driver
+from tools import page_commands
 
 ARDUINO = PortInfo("/dev/ttyACM0", "n/a", 0x2341, 0x43, "75")
 COLUMNS = {"columns": "table,relative", "separator": "semicolon"}
@@ -31,7 +32,7 @@ HELD = PortReport(
 def probe(slipstand: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
     """Run the command with one port that is found to be so."""
 
-    def run(found: PortReport, *arguments: str) -> Any:
+    def run(found: PortReport, *arguments: str, of: PortInfo = ARDUINO) -> Any:
         asked: list[tuple[str, bool]] = []
 
         def look(port: PortInfo, write: bool, tell: Callable[[str], None]) -> PortReport:
@@ -40,7 +41,7 @@ def probe(slipstand: Any, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]
             return found
 
         monkeypatch.setattr(device, "probe_port", look)
-        monkeypatch.setattr(device, "present_ports", lambda: [ARDUINO])
+        monkeypatch.setattr(device, "present_ports", lambda: [of])
         monkeypatch.setattr(device, "list_streams", list)
         outcome = slipstand("device", "probe", *arguments)
         assert outcome.err == f"{asked[0][0]}: listening\n"
@@ -61,6 +62,17 @@ def test_what_speaks_is_said_with_the_command_that_records_from_it(probe: Callab
         "--baud", "57600", "--parity", "E",
         "--set", "columns=table,relative", "--set", "separator=semicolon", "--rate", "80.4",
     ]  # fmt: skip
+
+
+def test_the_page_shows_what_is_printed(probe: Callable[..., Any]) -> None:
+    adapter = PortInfo("/dev/ttyUSB0", "n/a", 0x0403, 0x6001, "A50285BI")
+    columns = {"columns": "time_us,table,relative"}
+    lines = Recognition("csv", 0.99, 300, settings=columns, rate_hz=500.0)
+    outcome, _ = probe(
+        PortReport(adapter, "FTDI FT232R adapter", ProbeOutcome.RECOGNISED, recognition=lines), of=adapter
+    )
+    shown = page_commands.shown_lines("slipstand device probe")
+    assert page_commands.faults(shown, outcome.out.splitlines()) == [], outcome.out
 
 
 def test_a_rate_in_thousands_is_written_out(probe: Callable[..., Any]) -> None:

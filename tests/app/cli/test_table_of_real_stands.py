@@ -4,8 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from tools import page_commands
 
-def test_table_tells_what_is_the_stands_and_what_is_of_one_run(slipstand, real_stand_runs):
+
+def test_table_tells_what_is_the_stands_and_what_is_of_one_run(slipstand, real_stand_runs, monkeypatch):
+    monkeypatch.setenv("COLUMNS", page_commands.COLUMNS)
     said = slipstand("table", real_stand_runs)
     _, _, below = said.out.partition("\nEffects of the stand\n")
     notes, _, others = below.partition("\n\n")
@@ -15,6 +18,8 @@ def test_table_tells_what_is_the_stands_and_what_is_of_one_run(slipstand, real_s
     assert mode.endswith("% of the table's mass: tighten what is mounted.")
     assert ramp.startswith("1 of 3 runs (20261121T100000_1FFM0_001.h5): the release took 20.")
     assert "second mode" not in others
+    shown = page_commands.shown_lines("slipstand table real-stand")
+    assert page_commands.faults(shown, said.out.splitlines()) == [], said.out
 
 
 def test_table_gives_sizes_and_runs_to_programs(slipstand, real_stand_runs):

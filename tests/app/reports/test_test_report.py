@@ -106,6 +106,32 @@ def test_report_of_a_run_says_what_was_found(of_run, folder):
     assert of_run.subtitle == "1FFM0, a.h5"
 
 
+def test_reports_state_expanded_uncertainties_with_factor_and_coverage(of_run, of_campaign, folder):
+    found = repeat_saved_analysis(folder / "a.h5").identification.results
+    (_, _, meaning) = part(of_run, "Result")
+    (results, _, _) = part(of_run, "Results")
+    stated = re.fullmatch(r".* U = (\S+) \(k = 2, coverage of about 95 %\).*", meaning.text)
+    friction = found["friction_dynamic"]
+    assert float(stated[1]) == pytest.approx(2.0 * friction.standard_uncertainty, rel=0.05)
+    column = results.header.index("U (k = 2)")
+    period = next(row for row in results.rows if row[0] == "period")
+    assert float(period[column]) == pytest.approx(2e3 * found["period_s"].standard_uncertainty, rel=0.05)
+    (text,) = [block.text for block in part(of_run, "Procedure") if "k = 2" in getattr(block, "text", "")]
+    assert "a coverage of about 95 % where the distribution is normal" in text
+
+    (budget,) = [
+        block
+        for section in of_campaign.sections
+        for block in section.blocks
+        if isinstance(block, Grid) and "U (k = 2)" in block.header
+    ]
+    (row,) = [row for row in budget.rows if row[0] == "1FFM0"]
+    pooled = collect_runs([folder / "a.h5"]).campaign().rows[0].quantities["friction_dynamic"].quantity
+    assert float(row[budget.header.index("U (k = 2)")]) == pytest.approx(
+        2.0 * pooled.standard_uncertainty, rel=0.05
+    )
+
+
 def test_reports_of_simulated_runs_say_so_first_and_name_their_origin(of_run, of_campaign):
     for report in (of_run, of_campaign):
         first = report.sections[0].blocks[0]
