@@ -85,7 +85,8 @@ def format_uncertainty(uncertainty: float) -> str:
     """Write an uncertainty by itself, with two digits: `120`, `0.64`, `0.00011`, `2.8e-10`."""
     least, most = _FIXED_POINT
     if not least <= abs(uncertainty) < most:
-        return format_compact(uncertainty, 2)
+        mantissa, _, power = f"{abs(uncertainty):.1e}".partition("e")
+        return f"{mantissa}e{int(power)}" if uncertainty else "0"
     return format_fixed(abs(uncertainty), uncertainty_decimals(abs(uncertainty)))
 
 

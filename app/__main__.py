@@ -39,10 +39,6 @@ def _run() -> None:
     elif len(arguments) == 1 and arguments[0].lower().endswith(_RUN_SUFFIX):
         _run_window(run=arguments[0])
     else:
-        if _is_brief_simulation(arguments):
-            from analysis.compiled import interpret
-
-            interpret()
         from app.cli import run
 
         run()
@@ -72,16 +68,6 @@ def _keep_compiled_code_apart() -> None:
 
     folder = platformdirs.user_cache_path("slipstand", appauthor=False) / "compiled"
     os.environ.setdefault("NUMBA_CACHE_DIR", str(folder))
-
-
-_LONG = ("--effect", "--method", "--step", "--duration", "--rate")
-"""Options of `simulate` with which compiled code may be worth its loading."""
-
-
-def _is_brief_simulation(arguments: list[str]) -> bool:
-    is_long = any(argument.startswith(_LONG) for argument in arguments)
-    writes_run = any(argument.lower().endswith(".h5") for argument in arguments)
-    return arguments[:1] == ["simulate"] and not is_long and not writes_run
 
 
 def _run_if_child(arguments: list[str]) -> list[str]:

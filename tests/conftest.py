@@ -104,7 +104,7 @@ def slipstand(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatc
     """Run `slipstand ARGUMENTS` and return how it ended."""
 
     # A process of its own may leave functions uncompiled; this one goes on with other tests.
-    monkeypatch.setattr("app.__main__._is_brief_simulation", lambda _arguments: False)
+    monkeypatch.setattr("app.cli.simulate._is_brief", lambda _options: False)
 
     def run(*arguments: object) -> Outcome:
         monkeypatch.setattr(sys, "argv", ["slipstand", *map(str, arguments)])

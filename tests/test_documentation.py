@@ -1,5 +1,6 @@
 """Pages that are made from the program agree with it, and the site builds without a warning."""
 
+import gettext
 import re
 import subprocess
 import sys
@@ -7,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from messages.i18n import DOMAIN, LOCALE
 from tools import reference_pages, translated_pages
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -60,6 +62,18 @@ def test_a_translated_page_has_the_code_rows_and_pictures_of_its_source(page: Pa
         assert re.findall(pattern, text, re.M | re.S) == re.findall(pattern, source, re.M | re.S)
     for pattern in (r"`(slipstand [^`]*)`", r"^\|", r"^- ", r"\*\*(?:[A-Z]|Enter|Esc|Del|F2|Ctrl\+Z)\*\*"):
         assert len(re.findall(pattern, text, re.M)) == len(re.findall(pattern, source, re.M)), pattern
+
+
+@pytest.mark.parametrize("page", translated_pages.pages(), ids=lambda page: f"{page.parent.name}/{page.stem}")
+def test_a_translated_page_calls_screens_and_labels_as_the_translated_window_does(page: Path) -> None:
+    catalogue = gettext.translation(DOMAIN, LOCALE, [page.parent.name])
+    words = vars(catalogue)["_catalog"].values()
+    text = re.sub(r"`[^`]*`", "", page.read_text("utf-8"))
+    named = re.findall(r"\*\*([^*]+)\*\* (?:экран[иы]? )?\(Ctrl\+\d\)|\*\*([^*]+)\*\* ekrani \(Ctrl", text)
+    labels = re.findall(r"(?<!\*)\*([^*|\n]{4,})\*(?!\*)", text)
+    called = ["".join(one) for one in named] + labels
+    assert called or page.stem == "first-test"
+    assert [name for name in called if name not in words and f"{name}…" not in words] == []
 
 
 def test_a_changed_section_of_a_source_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

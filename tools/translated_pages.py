@@ -12,7 +12,12 @@ from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 LANGUAGES = ("ru", "uz")
-SOURCES = {"first-test.md": "tutorial/first-test.md", "record-a-test.md": "how-to/record-a-test.md"}
+SOURCES = {
+    "first-test.md": "tutorial/first-test.md",
+    "record-a-test.md": "how-to/record-a-test.md",
+    "review-runs.md": "how-to/review-runs.md",
+    "settings.md": "how-to/settings.md",
+}
 _STAMP = re.compile(r"\n% translated from \S+: (.*)\n\Z")
 
 

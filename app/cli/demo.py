@@ -135,7 +135,8 @@ def _record_campaign(options: DemoOptions) -> None:
     begins = now - duration(campaign_options)
     tests = plan_tests(campaign_options, stand, gauges, folder, begins)
     series = len({test.series for test in tests})
-    out.print_status(f"{len(tests)} tests of {series} series are recorded in {folder}")
+    recorded = "1 test is" if len(tests) == 1 else f"{len(tests)} tests of {series} series are"
+    out.print_status(f"{recorded} recorded in {folder}")
     with out.progress_bar("recording", total=1.0) as update:
         record_tests(tests, executor, update)
     with out.progress_bar("identifying", total=1.0) as update:

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.cli import shared_options as shared
-from app.cli.errors import CommandError
-from app.cli.options import REQUIRED, argument, choice, flag, number, option
+from app.cli.errors import CommandError, alternatives
+from app.cli.options import REQUIRED, argument, choice, completion, flag, number, option
 from app.cli.shared_options import JobOptions
 
 TABLE_FORMATS = ("text", "csv", "json", "markdown", "latex", "xlsx")
 FIGURE_FORMATS = ("png", "svg", "pdf")
+FIGURES = ("2", "3a", "3b", "4a", "4b", "5a", "5b", "fd-velocity", "fd-position", "fd-time")
 """Those of the reports, which are not imported for `--help`."""
 
 
@@ -97,7 +98,9 @@ class TableOptions:
     published: bool = flag("--published", "Beside the paper's Table 1, with the audit's flags.")
     repeats: bool = flag("--repeats", "Text, Markdown: show how the runs of each series differ.")
     column: list[str] | None = option(
-        "--column", "Also this column: friction_dynamic_plate, f_d from the plate alone; repeatable."
+        "--column",
+        "Also this column: friction_dynamic_plate, f_d from the plate alone; repeatable.",
+        autocompletion=completion(("friction_dynamic_plate",)),
     )
     exclude: list[str] | None = shared.exclude()
     save: bool = flag("--save", "Keep new analyses in their runs.")
@@ -119,11 +122,14 @@ class FiguresOptions:
     output: Path = option("-o --output", "Folder to write to, made if absent.", REQUIRED)
     format_name: str = choice("--format", FIGURE_FORMATS, "Format of the files; png has 300 dpi.", "png")
     series: list[str] | None = option(
-        "--series", "Of a folder: draw a run of this series; repeatable. The paper's 1FFM0 if absent."
+        "--series",
+        "Of a folder: draw a run of this series; repeatable. The paper's 1FFM0 if absent.",
+        autocompletion=completion(shared.series_codes),
     )
     figure: list[str] | None = option(
         "--figure",
-        "Only this figure: 2, 3a, 3b, 4a, 4b, 5a, 5b, fd-velocity, fd-position or fd-time; repeatable.",
+        f"Only this figure: {alternatives(FIGURES)}; repeatable.",
+        autocompletion=completion(FIGURES),
         metavar="FIGURE",
     )
     jobs: JobOptions

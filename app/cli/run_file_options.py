@@ -14,6 +14,12 @@ RUN_COLUMNS = (
 """Of `slipstand runs`."""
 
 
+def _completed_columns(incomplete: str) -> list[str]:
+    """Complete the last of several names, divided by commas."""
+    before, comma, last = incomplete.rpartition(",")
+    return [f"{before}{comma}{name}" for name in RUN_COLUMNS if name.startswith(last)]
+
+
 @dataclass(frozen=True, kw_only=True)
 class FileOptions:
     """How the file is read: the fields of `ImportPlan` and of its layout."""
@@ -166,7 +172,10 @@ class ListRunsOptions:
     text: str | None = option("--text", "Only runs with this in name, title, note, operator or source.")
     stale: bool = flag("--stale", "Only runs changed since their newest analysis.")
     columns: str | None = option(
-        "--columns", f"Columns to show, of {', '.join(RUN_COLUMNS)}.", metavar="NAME,NAME..."
+        "--columns",
+        f"Columns to show, of {', '.join(RUN_COLUMNS)}.",
+        metavar="NAME,NAME...",
+        autocompletion=_completed_columns,
     )
     sort: str | None = choice("--sort", RUN_COLUMNS, "Column to sort by; oldest first if absent.")
     reverse: bool = flag("--reverse", "In the reverse order; runs without a value stay last.")

@@ -10,7 +10,7 @@ from config.files import load_stand
 from drivers.registry import AVAILABLE
 
 
-def _series_codes() -> Iterable[str]:
+def series_codes() -> Iterable[str]:
     return load_stand().all_series
 
 
@@ -23,7 +23,7 @@ runs_or_folders = partial(argument, "Run files, or folders of runs.", metavar="R
 as_json = partial(flag, "--json", "One JSON document on stdout, nothing else there.")
 force = partial(flag, "--force", "Overwrite an existing output file.")
 series = partial(
-    option, "--series", "Series code, for example 1FFM0.", autocompletion=completion(_series_codes)
+    option, "--series", "Series code, for example 1FFM0.", autocompletion=completion(series_codes)
 )
 directory = partial(option, "--directory", "Folder of the runs; the recordings folder if absent.")
 exclude = partial(option, "--exclude", "A run to leave out, and why; repeatable.", metavar="RUN[=REASON]")
@@ -38,6 +38,7 @@ effects = partial(
     "--effect",
     f"What is not ideal, repeatable (docs/how-to/simulate-a-real-stand.md): {', '.join(LISTED)}.",
     metavar="NAME=VALUE",
+    autocompletion=completion([f"{text.partition(' ')[0]}=" for text in LISTED]),
 )
 
 

@@ -2,8 +2,9 @@
 
 import datetime
 import hashlib
+import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -25,10 +26,12 @@ from app.runs.analysis_request import AnalysisRequest
 from app.runs.batch.tasks import AnalysisTask, analyze_one
 from app.runs.campaign.collect import CollectedRuns, collect_runs
 from app.runs.campaign.origin import campaign_command
+from app.runs.edits import edit_run
 from app.runs.errors import NotARunError, RunError
 from app.runs.exchange.arrivals import READABLE, Arrivals
 from app.runs.exchange.import_run import free_path, import_foreign_file
 from app.runs.exchange.importing import ImportPlan
+from app.runs.metadata import SourceFile
 from app.runs.metadata_io import read_metadata
 from app.runs.reader import validate_and_read
 from app.runs.validator import shared_validator
@@ -38,6 +41,7 @@ from config.schema import ConfigError
 _TABLE_FORMATS = {
     ".txt": "text", ".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex", ".xlsx": "xlsx"
 }  # fmt: skip
+_PART = 1 << 20
 _REQUEST = AnalysisRequest(classical=False)
 
 
@@ -53,8 +57,8 @@ class FolderWatch:
     report: Path | None
     analysed: list[Path] = field(default_factory=list)
     """Run files that count in table and report."""
-    imported: set[str] = field(default_factory=set)
-    """SHA-256 of the files of which there is a run."""
+    imported: dict[SourceFile, Path] = field(default_factory=dict)
+    """Runs of the files that were imported."""
 
     def find_earlier_runs(self) -> None:
         """Take what an earlier start has imported, so that nothing is imported twice."""
@@ -65,7 +69,8 @@ class FolderWatch:
                 out.print_status(f"error: {error}")
                 continue
             self.analysed.append(path)
-            self.imported.add(known.source_file.sha256)
+            if known.source_file.sha256:
+                self.imported[known.source_file] = path
 
     def take(self, path: Path) -> dict[str, Any] | None:
         """Import and identify one file; None of one of which there is a run.
@@ -74,7 +79,8 @@ class FolderWatch:
         """
         if path.suffix.lower() == ".h5" and _is_run(path):
             return self._identify(path, {"file": str(path)})
-        if _sha256(path) in self.imported:
+        sums = _prefix_sums(path, {source.size_bytes for source in self.imported})
+        if any(source.sha256 == sums[None] for source in self.imported):
             return None
         with out.progress_bar(f"reading {path.name}", total=1.0) as update:
             run = import_foreign_file(
@@ -82,7 +88,20 @@ class FolderWatch:
                 gauges=load_gauges(), report=update, **self.metadata,
             )  # fmt: skip
         out.print_status(f"{path.name}: {', '.join(filter(None, import_summary(run)))}")
-        return self._identify(Path(run.run), import_document(run))
+        made = Path(run.run)
+        for source, earlier in list(self.imported.items()):
+            if source.sha256 == sums.get(source.size_bytes):
+                self._supersede(earlier, path, made)
+                del self.imported[source]
+        known = validate_and_read(made, read_metadata, validator=shared_validator())
+        self.imported[known.source_file] = made
+        return self._identify(made, import_document(run))
+
+    def _supersede(self, earlier: Path, path: Path, made: Path) -> None:
+        """Exclude the run of a file that was not complete when it was taken. Raises RunError."""
+        reason = f"{path.name} was not complete; {made.name} is of the whole file"
+        edit_run(earlier, "watch", excluded=reason)
+        out.print_status(f"{earlier.name} does not count any more: {reason}")
 
     def _identify(self, path: Path, document: dict[str, Any]) -> dict[str, Any]:
         if path not in self.analysed:
@@ -93,6 +112,12 @@ class FolderWatch:
         return known | (
             {"error": str(found.error)} if found.document is None else {"analysis": found.document}
         )
+
+    def is_out_of_date(self) -> bool:
+        """Tell whether table or report lack a run: an earlier start was stopped between the two."""
+        newest = max((path.stat().st_mtime_ns for path in self.analysed), default=0)
+        written = [path for path in (self.table, self.report) if path]
+        return any(not path.exists() or path.stat().st_mtime_ns < newest for path in written)
 
     def write(self) -> None:
         """Write table and report of all runs anew. Raises RunError, AnalysisError."""
@@ -116,6 +141,8 @@ def watch(options: WatchOptions) -> None:
     watched = _folder_watch(options)
     arrivals = Arrivals(watched.folder, tuple(options.pattern or READABLE))
     watched.find_earlier_runs()
+    if watched.is_out_of_date():
+        _write(watched)
     out.print_status(f"watching {watched.folder}; runs go to {watched.runs}; Ctrl-C ends it")
     with out.print_json_list() if options.as_json else nullcontext(None) as add:
         while True:
@@ -138,10 +165,14 @@ def _take_all(
         if "error" in document:
             out.print_status(f"error: {document['error']}")
     if any("run" in document for document in documents):
-        try:
-            watched.write()
-        except (RunError, AnalysisError) as error:
-            out.print_status(f"error: {error}")
+        _write(watched)
+
+
+def _write(watched: FolderWatch) -> None:
+    try:
+        watched.write()
+    except (RunError, AnalysisError) as error:
+        out.print_status(f"error: {error}")
 
 
 def _documents(watched: FolderWatch, arrivals: Arrivals, *, at_once: bool) -> Iterator[dict[str, Any]]:
@@ -199,9 +230,20 @@ def _is_run(path: Path) -> bool:
     return True
 
 
-def _sha256(path: Path) -> str:
+def _prefix_sums(path: Path, sizes: Collection[int | None]) -> dict[int | None, str]:
+    """SHA-256 of the first bytes of a file, by their number; None for all of it. Raises RunError."""
+    sums: dict[int | None, str] = {}
+    digest, place = hashlib.sha256(), 0
     try:
         with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+            size_bytes = os.fstat(file.fileno()).st_size
+            for end in sorted(one for one in sizes if one and one < size_bytes):
+                while place < end and (part := file.read(min(_PART, end - place))):
+                    digest.update(part)
+                    place += len(part)
+                sums[end] = digest.copy().hexdigest()
+            while part := file.read(_PART):
+                digest.update(part)
+            return sums | {None: digest.hexdigest()}
     except OSError as error:
         raise RunError("{path} cannot be read ({fault})", path=path, fault=error.strerror) from None

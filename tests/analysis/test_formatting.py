@@ -7,7 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from analysis.formatting import format_length, format_number, format_with_unit
+from analysis.formatting import (
+    format_interval,
+    format_length,
+    format_number,
+    format_uncertainty,
+    format_value,
+    format_with_unit,
+)
 from analysis.identify import identify
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.one_mass.identify import MeasuredQuantity, identify_one_mass, single_channel
@@ -16,6 +23,22 @@ from analysis.record import Record, RecordError, StandMasses
 from analysis.synthetic import Truth, simulate_readings
 
 EXPONENT = r"\de[+-]\d"
+
+
+@pytest.mark.parametrize("uncertainty", [2.2e-4, 9.96e-4, 0.0123, 1.5, 120.0])
+def test_an_interval_has_no_fewer_digits_than_its_value(uncertainty: float) -> None:
+    value = 0.10019 if uncertainty < 1.0 else 59370.0
+    low, _, high = format_interval(value - 1.96 * uncertainty, value + 1.96 * uncertainty).partition(" to ")
+    decimals = len(format_value(value, uncertainty).value.partition(".")[2])
+    assert {len(end.partition(".")[2]) for end in (low, high)} <= {decimals, decimals + 1}
+
+
+@pytest.mark.parametrize(
+    ("uncertainty", "shown"),
+    [(2e-7, "2.0e-7"), (9.96e-6, "1.0e-5"), (1e-5, "0.000010"), (0.00022, "0.00022"), (0.0, "0")],
+)
+def test_an_uncertainty_has_two_digits_at_any_size(uncertainty: float, shown: str) -> None:
+    assert format_uncertainty(uncertainty) == shown
 
 
 @pytest.mark.parametrize(

@@ -85,6 +85,24 @@ def record_figure(record: Record, identification: Identification, unit: str = "m
     return figure
 
 
+def record_caption(record: Record, identification: Identification) -> str:
+    """Caption of the figure, which explains the marks that it has."""
+    events = identification.events
+    parts = ["Record, simulation with the fitted parameters, and residuals, over all that was fitted."]
+    if events.release_s is not None and events.slip_end_s is not None:
+        parts.append("Shaded: slip.")
+    if events.free_decay_end_s is not None:
+        parts.append("Hatched: not fitted, after the free decay.")
+    shown = _shown(record.time_s - (events.release_s or 0.0), identification)
+    gauges = (
+        (record.table_displacement_m, record.table_overload),
+        (record.relative_displacement_m, record.relative_overload),
+    )
+    if any(read is not None and _unread(read, overload)[shown].any() for read, overload in gauges):
+        parts.append("Red marks: absent or overloaded readings.")
+    return " ".join(parts)
+
+
 def _shown(time_s: FloatArray, identification: Identification) -> NDArray[np.bool_]:
     release_s, slip_end_s = identification.events.release_s, identification.events.slip_end_s
     if identification.kind == "one-mass" and "turning_s" in identification.parameters:
@@ -114,7 +132,7 @@ def _mark_unread(
     axes: Axes, time_s: FloatArray, reading: FloatArray, overload: NDArray[np.bool_] | None
 ) -> None:
     """Mark times at which a reading is absent or overloaded, along the lower edge."""
-    unread = np.isnan(reading) if overload is None else np.isnan(reading) | overload
+    unread = _unread(reading, overload)
     if unread.any():
         # the width of a mark is that of a line: a single reading of thousands would be too narrow to be seen
         axes.plot(
@@ -123,6 +141,10 @@ def _mark_unread(
             label="absent or overloaded",
         )  # fmt: skip
         axes.legend(loc="upper right", ncols=3)
+
+
+def _unread(reading: FloatArray, overload: NDArray[np.bool_] | None) -> NDArray[np.bool_]:
+    return np.isnan(reading) if overload is None else np.isnan(reading) | overload
 
 
 def _channel(

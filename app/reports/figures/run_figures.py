@@ -29,6 +29,7 @@ from analysis.quantities import Quantity
 from analysis.record import Record
 from app.reports.figures.style import (
     DASHED,
+    HEIGHT_IN,
     PLATE,
     SIMULATION,
     TABLE,
@@ -167,10 +168,10 @@ class RunFigure:
     draw: Draw
     simulated: bool = True  # it shows the fitted motion, and needs one
 
-    def render(self, run: RunFigureData, title: str = "") -> Figure | None:
+    def render(self, run: RunFigureData, title: str = "", height_in: float = HEIGHT_IN) -> Figure | None:
         if self.simulated and run.motion is None:
             return None
-        figure, axes = new_figure()
+        figure, axes = new_figure(height_in)
         self.draw(axes, run)
         axes.set_xlabel("time since release $t$ (s)")
         axes.margins(x=0.01)

@@ -21,6 +21,7 @@ DASHED: Final = (0, (4, 2))
 FORMATS: Final = ("png", "svg", "pdf")
 FAMILY = "IBM Plex Sans"
 COLUMN_IN = 3.46  # width of a column of a journal, 88 mm
+HEIGHT_IN = 2.5
 _STRETCHES = 4000  # more stretches than a page has dots across at 300 dpi
 Floats = NDArray[np.float64]
 _REPRODUCIBLE: Final[dict[str, dict[str, Any]]] = {
@@ -55,7 +56,7 @@ class StyledFigure(Figure):
             super().draw(renderer)
 
 
-def new_figure(height_in: float = 2.5) -> tuple[Figure, Axes]:
+def new_figure(height_in: float = HEIGHT_IN) -> tuple[Figure, Axes]:
     figure = Figure(figsize=(COLUMN_IN, height_in), layout="constrained")
     return figure, figure.subplots()
 

@@ -137,7 +137,7 @@ LEGEND: Final = (
 )
 REPEATS_LEGEND: Final = (
     "Standard deviation of the runs in percent of the mean, and Birge ratio (1: the runs scatter as their"
-    " noise predicts):"
+    " noise predicts)"
 )
 _PUBLISHED_LEGEND: Final = "Measured minus published, with the published c read as kgf/m:"
 
@@ -150,7 +150,7 @@ def text_lines(content: TableContent, width: int, *, with_repeats: bool = False)
     yield from blocks(table_headers(content.columns), rows, width)
     yield from ("", *_wrapped(LEGEND, width))
     if with_repeats:
-        yield from ("", *_wrapped(REPEATS_LEGEND, width), "")
+        yield from ("", *_wrapped(f"{REPEATS_LEGEND}:", width), "")
         yield from blocks(*repeats_grid(content), width)
     if content.published is not None:
         yield from ("", *_wrapped(_PUBLISHED_LEGEND, width), "")

@@ -99,3 +99,4 @@ class Report(msgspec.Struct, frozen=True):
     date: str  # ISO date of the report, the only difference between two reports of the same runs
     software: str
     sections: list[Section]
+    mark: str = ""  # warning at the head of every page, as SIMULATED

@@ -15,7 +15,7 @@ from app.reports.test_report.run_report import run_sections
 from app.runs.analysis_request import quote_command
 from app.runs.analyze import repeat_saved_analysis
 from app.runs.campaign.collect import CollectedRuns
-from app.runs.origin import program_document, software_text
+from app.runs.origin import SIMULATED, is_simulated, program_document, software_text
 from app.runs.reader import compute_fingerprint
 from app.runs.validator import Validator
 
@@ -39,7 +39,8 @@ def build_report(gathered: CollectedRuns, content: TableContent, head: ReportHea
             _folder([run.name for run in gathered.runs]),
         )
     subtitle = f"Campaign of {len(gathered.runs)} runs in {len(content.campaign.rows)} series"
-    return _report(head.numbered(content.origin.inputs_hash), subtitle, campaign_sections(material))
+    mark = content.origin.mark
+    return _report(head.numbered(content.origin.inputs_hash), subtitle, campaign_sections(material), mark)
 
 
 def build_run_report(path: Path, head: ReportHead) -> Report:
@@ -57,10 +58,12 @@ def _run_report(
     metadata = analysis.run.metadata
     subtitle = f"{metadata.series}, {path.name}" if metadata.series else path.name
     sections = run_sections(analysis, compute_fingerprint(path), reproduce, excluded or metadata.excluded)
-    return _report(head.numbered(analysis.document["origin"]["inputs_hash"]), subtitle, sections)
+    origin = analysis.document["origin"]
+    mark = SIMULATED if is_simulated(origin) else ""
+    return _report(head.numbered(origin["inputs_hash"]), subtitle, sections, mark)
 
 
-def _report(head: ReportHead, subtitle: str, sections: list[Section]) -> Report:
+def _report(head: ReportHead, subtitle: str, sections: list[Section], mark: str) -> Report:
     software = software_text(program_document()).capitalize()
     rows = [
         ("report number", head.number),
@@ -70,9 +73,8 @@ def _report(head: ReportHead, subtitle: str, sections: list[Section]) -> Report:
         ("method", head.method),
     ]
     stated = shared.without_empty(rows).rows
-    return Report(
-        head.title, subtitle, stated, head.logo, head.number, head.date.isoformat(), software, sections
-    )
+    date = head.date.isoformat()
+    return Report(head.title, subtitle, stated, head.logo, head.number, date, software, sections, mark)
 
 
 def _folder(names: Sequence[str]) -> str:

@@ -57,18 +57,20 @@ def campaign_sections(material: CampaignReportInput) -> list[Section]:
     results = blocks.Grid(["series", "n", *symbols], table, len(symbols) + 1, small=True, note=LEGEND)
     no_units = [blocks.Symbol(row.symbol.markup) for row in columns[1:]]
     scatter: list[list[Cell]] = [list(row) for row in repeats_grid(material.content)[1]]
-    repeats = blocks.Grid(["series", *no_units], scatter, len(no_units), small=True, note=REPEATS_LEGEND)
+    repeats = blocks.Grid(
+        ["series", *no_units], scatter, len(no_units), small=True, note=f"{REPEATS_LEGEND}."
+    )
     return [
         Section("Campaign", [*_simulated(material), _summary(material)]),
         *_notes(material),
         Section("Table of results", [results], wide=True),
         Section("Uncertainty of the dynamic friction coefficient", list(_budget(material)), wide=True),
         Section("Repeatability", [repeats], wide=True),
+        Section("Runs", [_runs(material)], wide=True),
         Section("Figures", list(_figures(material))),
         shared.stand_section(list(gathered.stands.values())),
         shared.gauges_section(list(gathered.gauges.values())),
         shared.PROCEDURE,
-        Section("Runs", [_runs(material)], wide=True),
         Section("Data", shared.fingerprint_columns(prints)),
         Section(ORIGIN, [blocks.Points(list(material.content.origin.sentences()))]),
         shared.SIGNATURES,

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Final, Literal
 
+from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER
 from analysis.catalogue import (
     CATALOGUE,
     KILOGRAM,
@@ -16,12 +17,19 @@ from analysis.catalogue import (
     definition,
     reading_units,
 )
-from analysis.formatting import format_interval, format_uncertainty, typeset, typeset_sentence
+from analysis.formatting import (
+    format_fixed,
+    format_interval,
+    format_uncertainty,
+    typeset,
+    typeset_sentence,
+    uncertainty_decimals,
+)
 from analysis.identification import Degree, Identification
 from analysis.plate.trends import velocity_statement
 from analysis.quantities import BudgetLine, BudgetSource, Quantity
 from analysis.verdict_text import EFFECT_TITLES, describe_verdict, model_title
-from app.reports.figures.record_figure import record_figure
+from app.reports.figures.record_figure import record_caption, record_figure
 from app.reports.figures.style import print_style
 from app.reports.table.text import ORIGIN
 from app.reports.test_report import blocks, shared
@@ -35,6 +43,7 @@ from drivers.samples import Losses
 _BUDGETED: Final = "friction_dynamic", "friction_static", "period_s", "damping_n1_per_s", "stiffness_n_per_m"
 _HEADLINES: Final = ("friction_dynamic", "friction_static_lower", "period_s")
 _FIGURES: Final = ("3b", "4b", "5a", "5b", "fd-velocity", "fd-position", "fd-time")
+_LOW_IN: Final = 2.0  # height of those figures: a page has room for all
 _ENDINGS: Final = {
     "rest": "at rest",
     "enough": "when waiting would not have narrowed the results",
@@ -55,7 +64,7 @@ def run_sections(
     warnings: list[str] = []
     for warning in found.warnings:
         texts = of_stand if warning.code in EFFECT_TITLES else warnings
-        texts.append(f"{warning.message} ({warning.code})")
+        texts.append(f"{_capitalized(str(warning.message))} ({warning.code})")
     sums = ", ".join(f"{name} {value}" for name, value in print_of_file.columns.items())
     columns = [("identifier of the run", print_of_file.identifier), ("CRC-32 of its columns", sums)]
     return [
@@ -108,15 +117,26 @@ def _result(found: Identification, unit: str) -> Iterator[blocks.Block]:
         for size in (found.model.residual_rms_m, found.model.noise_rms_m)
     )
     verdict = str(describe_verdict(found.model, found.kind))
-    text = f"{verdict[0].upper()}{verdict[1:]} (residual {residual}, noise {noise})."
+    text = f"{_capitalized(verdict)} (residual {residual}, noise {noise})."
     holds: Literal["warn", "bad"] = "warn" if found.model.degree is Degree.FRICTION else "bad"
     yield blocks.Conclusion(symbol, value, text, "ok" if found.model.adequate else holds)
+    if found.model.degree is Degree.NONE:
+        yield Text(
+            "This value is that of the nearest law, for information only. Its uncertainty does not cover what"
+            " the law leaves unexplained, so that no expanded uncertainty is stated for it."
+        )
+        return
     symbol_of_unit = row.unit_at(Place.REPORT, quantity.unit).symbol
     expanded = f"{_expanded(row, quantity)} {symbol_of_unit}".rstrip()
     yield Text(
         f"± standard uncertainty. Expanded uncertainty U = {expanded} (k = 2, coverage of about 95 %); the"
         f" interval of 95 % coverage is {_interval(row, quantity)}."
     )
+
+
+def _capitalized(sentence: str) -> str:
+    """A sentence with its first letter large, unless it begins with a symbol: `f_d`, `T`."""
+    return sentence if sentence[1:2] in ("_", " ") else sentence[:1].upper() + sentence[1:]
 
 
 def _test(analysis: Analysis) -> blocks.Facts:
@@ -187,8 +207,9 @@ def _conditions(metadata: RunMetadata) -> blocks.Facts:
 
 def _results(found: Identification) -> Iterator[blocks.Block]:
     rows: list[list[Cell]] = []
+    redundant = (STATIC_LOWER, STATIC_UPPER) if "friction_static" in found.results else ()
     for row in CATALOGUE:
-        quantity = found.results.get(row.name)
+        quantity = None if row.name in redundant else found.results.get(row.name)
         if quantity is not None and math.isfinite(quantity.value):
             shown = row.format(quantity, Place.REPORT)
             uncertainty, unit = shown.uncertainty or "–", shown.unit or "1"
@@ -206,12 +227,25 @@ def _results(found: Identification) -> Iterator[blocks.Block]:
         yield Text(typeset_sentence(str(velocity_statement(found.plate))))
     if found.model is not None and found.model.tried:
         laws: list[list[Cell]] = []
+        decimals = _decimals(found.results.get("friction_dynamic"))
         for law in found.model.tried:
-            friction, bic = f"{law.friction_dynamic:.6f}", typeset(f"{law.bic:.1f}")
+            friction, bic = format_fixed(law.friction_dynamic, decimals), typeset(f"{law.bic:.1f}")
             title = str(model_title(law.name, law.parts))
             laws.append([title, friction, bic, MICROMETRE.number(law.residual_rms_m, 2)])
         heads: list[Cell] = ["friction law", blocks.Symbol("f_d"), "BIC", f"residual, {MICROMETRE.symbol}"]
-        yield blocks.Grid(heads, laws, numbers=3, note="The law with the lowest BIC is taken.")
+        yield blocks.Grid(heads, laws, numbers=3, note=_LAWS_NOTE)
+
+
+_LAWS_NOTE: Final = (
+    "The law with the lowest BIC is taken; its f_d and u stand above. f_d of the others is for comparison"
+    " and has no uncertainty."
+)
+
+
+def _decimals(found: Quantity | None) -> int:
+    """Decimals of f_d: those of its uncertainty, else six."""
+    stated = found is not None and 0.0 < found.standard_uncertainty < math.inf
+    return uncertainty_decimals(found.standard_uncertainty) if found is not None and stated else 6
 
 
 def _interval(row: QuantityDefinition, quantity: Quantity) -> str:
@@ -266,12 +300,8 @@ def _share(deviation: float | None, row: QuantityDefinition) -> str:
 
 
 def _figures(analysis: Analysis) -> list[blocks.Block]:
-    caption = (
-        "Record, simulation with the fitted parameters, and residuals, over all that was fitted. Shaded:"
-        " slip. Hatched: not fitted, after the free decay. Red marks: absent or overloaded readings."
-    )
-    unit = analysis.run.metadata.unit
+    record, found, unit = analysis.record, analysis.identification, analysis.run.metadata.unit
     with print_style():
-        whole = shared.drawing(record_figure(analysis.record, analysis.identification, unit), caption)
-        items = shared.run_drawings(analysis, _FIGURES)
+        whole = shared.drawing(record_figure(record, found, unit), record_caption(record, found))
+        items = shared.run_drawings(analysis, _FIGURES, height_in=_LOW_IN)
     return [whole, blocks.Drawings(items)] if items else [whole]

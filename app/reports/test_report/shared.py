@@ -10,7 +10,7 @@ from analysis.formatting import NO_BREAK_SPACE, format_compact, format_value, fo
 from analysis.laws.catalogue import COMPARED_LAWS, FALLBACK_LAWS
 from app.reports.figures.plate_figures import ALL_FIGURES
 from app.reports.figures.run_figures import RunFigureData
-from app.reports.figures.style import figure_svg
+from app.reports.figures.style import HEIGHT_IN, figure_svg
 from app.reports.test_report.blocks import Block, Cell, Drawing, Facts, Grid, Section, Signatures, Text
 from app.runs.analyze import Analysis
 from app.runs.reader import Fingerprint
@@ -74,11 +74,17 @@ def drawing(figure: Figure, caption: str) -> Drawing:
     return Drawing(figure_svg(figure), caption)
 
 
-def run_drawings(analysis: Analysis, numbers: Sequence[str], prefix: str = "") -> list[Drawing]:
+def run_drawings(
+    analysis: Analysis, numbers: Sequence[str], prefix: str = "", height_in: float = HEIGHT_IN
+) -> list[Drawing]:
     """The figures of a run with these numbers, drawn in `print_style`, that it has something to show in."""
     unit = analysis.run.metadata.unit
     run = RunFigureData.from_identification(analysis.record, analysis.identification, unit)
-    made = [(one.render(run), prefix + one.caption) for one in ALL_FIGURES if one.number in numbers]
+    made = [
+        (one.render(run, height_in=height_in), prefix + one.caption)
+        for one in ALL_FIGURES
+        if one.number in numbers
+    ]
     return [drawing(figure, caption) for figure, caption in made if figure is not None]
 
 

@@ -65,11 +65,21 @@ class CampaignOrigin:
     @property
     def warning(self) -> str:
         """Says that runs are simulated, where any is; else ""."""
-        count = sum(one.origin["source"] == RunSource.SIMULATED for one in self.runs.values())
+        count = self._simulated_count
         if not count:
             return ""
         which = f"{count} of {len(self.runs)} runs are" if len(self.runs) > 1 else "the run is"
         return f"{SIMULATED}: {which} of a simulated stand, not of a real one."
+
+    @property
+    def mark(self) -> str:
+        """Mark of each page: `SIMULATED`, with the count where only some runs are; "" where none is."""
+        count, every = self._simulated_count, len(self.runs)
+        return "" if not count else SIMULATED if count == every else f"{SIMULATED}: {count} of {every} runs"
+
+    @property
+    def _simulated_count(self) -> int:
+        return sum(one.origin["source"] == RunSource.SIMULATED for one in self.runs.values())
 
     @property
     def inputs_hash(self) -> str:

@@ -1,5 +1,6 @@
 """`analyze` over many runs and `demo --campaign`: kept results are reused; results agree with the truth."""
 
+import datetime
 import shutil
 from pathlib import Path
 from typing import Any
@@ -63,7 +64,10 @@ def test_a_campaign_is_held_against_its_truth(slipstand: Any, tmp_path: Path) ->
     assert friction["truth"] == 0.1
     assert abs(friction["value"] - 0.1) < 4.5 * friction["standard_uncertainty"]
     assert found["compared"] == 10
-    run = open_run(Path(found["runs"][0]))
+    runs = [open_run(Path(path)) for path in found["runs"]]
+    ends = [run.metadata.start_time + datetime.timedelta(seconds=11.0) for run in runs]
+    assert max(ends) <= datetime.datetime.now().astimezone(), "a run was recorded before now"
+    run = runs[0]
     assert len(run.analyses) == 1
     assert run.metadata.truth["friction_dynamic"] == 0.1
     assert_one_error_line(slipstand(*command), "holds runs already")

@@ -10,8 +10,9 @@ from typing import Any
 import pytest
 from cli_kit import assert_one_error_line
 
-from app.cli.result_options import FIGURE_FORMATS, TABLE_FORMATS
+from app.cli.result_options import FIGURE_FORMATS, FIGURES, TABLE_FORMATS
 from app.reports.figures import style
+from app.reports.figures.plate_figures import ALL_FIGURES
 from app.reports.table import files
 
 LISTS = ((), ("calibrate",), ("device",))
@@ -111,10 +112,19 @@ def completed(words: str) -> list[str]:
         ("slipstand record --series 2SSM", ["2SSM0", "2SSM1", "2SSM2", "2SSM3"]),
         ("slipstand record --protocol gs", ["gsv", "gsv-234"]),
         ("slipstand runs --sinc", ["--since"]),
+        ("slipstand figures --figure fd-", ["fd-velocity", "fd-position", "fd-time"]),
+        ("slipstand figures --series 3SSM", ["3SSM0", "3SSM1", "3SSM2", "3SSM3"]),
+        ("slipstand table --column f", ["friction_dynamic_plate"]),
+        ("slipstand runs --columns run,s", ["run,series", "run,seconds", "run,source"]),
+        ("slipstand demo --effect release-r", ["release-ramp="]),
     ],
 )
 def test_words_are_completed(words: str, expected: list[str]) -> None:
     assert completed(words) == expected
+
+
+def test_figures_that_are_completed_are_those_that_are_drawn() -> None:
+    assert ("2", *(figure.number for figure in ALL_FIGURES)) == FIGURES
 
 
 def test_completion_is_installed_by_an_option(slipstand: Any) -> None:

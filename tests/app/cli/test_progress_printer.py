@@ -5,7 +5,14 @@ import numpy as np
 import pytest
 from ring_kit import ring_rows
 
-from app.acquisition.messages import EndReason, PullbackState, RunEnded, StandPosition, StateChanged
+from app.acquisition.messages import (
+    Connected,
+    EndReason,
+    PullbackState,
+    RunEnded,
+    StandPosition,
+    StateChanged,
+)
 from app.acquisition.ring import RingRows
 from app.cli.progress_printer import ProgressPrinter, StatusLine
 
@@ -49,6 +56,13 @@ def test_sentences_with_figures_each_once(capsys):
         "Leave the stand alone: its zero is being taken.",
         "Pull the table back to 12.0\u202fmm: now 0.0\u202fmm",
     ]
+
+
+def test_a_device_without_firmware_is_named_without_a_gap(capsys):
+    printer = ProgressPrinter(Line())
+    printer.on_event(Connected("CSV lines", "", 500.0, "ring"))
+    printer.on_event(Connected("slipstand-fw", "1.2", 2000.0, "ring"))
+    assert told(capsys) == ["connected: CSV lines, 500 Hz", "connected: slipstand-fw 1.2, 2000 Hz"]
 
 
 def test_on_a_terminal_the_figure_follows_the_table(capsys):

@@ -217,7 +217,21 @@ def test_an_effect_that_cannot_be_is_refused(slipstand: Any, given: Any, said: s
     assert_one_error_line(slipstand("simulate", "--series", "1FFM0", *given), said)
 
 
-@pytest.mark.parametrize("more", [[], ["--static-friction", "0.2", "--tilt", "0.01"]])
+@pytest.mark.parametrize("more", [["--duration", "100"], ["--rate", "20000"], ["--method", "paper"]])
+def test_a_long_one_is_compiled_whatever_the_order_of_its_arguments(more: list[str]) -> None:
+    code = (
+        "import sys; from analysis import compiled; from app.__main__ import main\n"
+        "compiled.interpret = lambda: print('interpreted', file=sys.stderr)\n"
+        "import app.cli.simulate as command\ncommand.interpret = compiled.interpret\n"
+        "import app.cli.simulation as work\nwork.simulate_test = lambda options: None\nmain()"
+    )
+    for arguments in ([*more, "--series", "1FFM0"], ["--series", "1FFM0"]):
+        command = [sys.executable, "-c", code, "simulate", *arguments]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert done.stderr.split() == ([] if more[0] in arguments else ["interpreted"])
+
+
+@pytest.mark.parametrize("more", [[], ["--duration", "5"], ["--static-friction", "0.2", "--tilt", "0.01"]])
 def test_a_brief_one_is_the_same_without_compiled_code(slipstand: Any, more: list[str]) -> None:
     """What it prints is that of compiled code, to the last digit, and numba is not even imported."""
     arguments = ["simulate", "--series", "1FFM0", "--friction", "0.12", *more, "--json"]

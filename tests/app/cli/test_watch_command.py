@@ -63,6 +63,37 @@ def test_ctrl_c_ends_it_with_130_and_what_came_is_there(slipstand, incoming, mon
     assert looks == [0.5] * 4
 
 
+def test_a_file_that_grew_after_it_was_taken_counts_once(slipstand, tmp_path, incoming) -> None:
+    """A logger paused for longer than two looks. Another record under the same name is another test."""
+    write_record(incoming, "a.csv", 1)
+    whole = (incoming / "a.csv").read_text()
+    (incoming / "a.csv").write_text("\n".join(whole.splitlines()[:-500]) + "\n")
+    table = tmp_path / "table.csv"
+    assert slipstand("watch", incoming, *READ, "--once").code == 0
+    (incoming / "a.csv").write_text(whole)
+    outcome = slipstand("watch", incoming, *READ, "--once", "--write-table", table)
+    assert "a.h5 does not count any more: a.csv was not complete; a-2.h5 is of the whole file" in outcome.err
+    assert table.read_text().splitlines()[1].startswith("1FFM0,FF,0.012,131.6,1,")
+
+    write_record(incoming, "a.csv", 2)
+    assert slipstand("watch", incoming, *READ, "--once", "--write-table", table).out.startswith("a-3.h5: ")
+    assert table.read_text().splitlines()[1].startswith("1FFM0,FF,0.012,131.6,2,")
+
+
+def test_a_table_that_an_interrupted_start_did_not_write_is_written_by_the_next(
+    slipstand, tmp_path, incoming
+) -> None:
+    write_record(incoming, "a.csv", 1)
+    table = tmp_path / "table.csv"
+    assert slipstand("watch", incoming, *READ, "--once").code == 0
+    outcome = slipstand("watch", incoming, *READ, "--once", "--write-table", table)
+    assert (outcome.code, outcome.out) == (0, "")
+    first = table.stat().st_mtime_ns
+    assert table.read_text().splitlines()[1].startswith("1FFM0,FF,0.012,131.6,1,")
+    slipstand("watch", incoming, *READ, "--once", "--write-table", table)
+    assert table.stat().st_mtime_ns == first
+
+
 def test_what_cannot_be_watched_or_written_is_told(slipstand, tmp_path, incoming) -> None:
     assert "is no folder" in slipstand("watch", tmp_path / "absent", *READ).err
     wrong = slipstand("watch", incoming, *READ, "--write-table", tmp_path / "table.odt")

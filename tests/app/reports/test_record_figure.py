@@ -11,9 +11,9 @@ from analysis.identify import identify
 from analysis.motion.one_mass import OneMassDecay, simulate
 from analysis.one_mass.identify import identify_one_mass, single_channel
 from analysis.record import Record
-from analysis.synthetic import simulate_readings
+from analysis.synthetic import simulate_readings, simulate_record
 from app.cli.analysis_text import print_analysis
-from app.reports.figures.record_figure import figure_title, record_figure
+from app.reports.figures.record_figure import figure_title, record_caption, record_figure
 from app.reports.figures.run_figures import RUN_FIGURES, RunFigureData
 from app.reports.figures.style import decimate_for_print, print_style
 from app.runs.saved_analyses import analysis_document
@@ -118,3 +118,14 @@ def test_residuals_of_each_gauge_have_a_panel_over_all_that_was_fitted(pushed_ba
     marks = [line for line in table.lines if line.get_label() == "absent or overloaded"]
     assert [len(line.get_xdata()) for line in marks] == [10]
     assert not [line for line in relative.lines if line.get_label() == "absent or overloaded"]
+
+
+def test_the_caption_explains_the_marks_that_the_figure_has(pushed_back):
+    record, found = pushed_back
+    assert "Shaded: slip. Hatched: not fitted, after the free decay. Red marks" in record_caption(
+        record, found
+    )
+
+    whole = simulate_record(truth_of(duration_s=6.0))
+    caption = record_caption(whole, identify(whole))
+    assert caption.endswith("over all that was fitted. Shaded: slip.")

@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from matplotlib.markers import CARETDOWN, CARETUP
 from reports_kit import truth_of
 
 from analysis.identification import Events, Identification, ModelSelection
@@ -175,8 +176,26 @@ def test_friction_by_slip_shows_each_slip_with_its_interval_and_the_slope(drawn,
         with print_style():
             (axes,) = figure.render(drawn).axes
         (points,) = axes.containers
-        assert len(points[0].get_xdata()) == len(found.plate.friction)
+        beyond = axes.collections[-1].get_paths()
+        assert len(points[0].get_xdata()) + len(beyond) == len(found.plate.friction)
         assert "95 %" in axes.get_legend().get_texts()[0].get_text()
     time_s = points[0].get_xdata()
     assert 0.0 < time_s[0] < time_s[-1] < drawn.slip_end_s
     assert PLATE_FIGURES[0].render(dataclasses.replace(drawn, plate=None)) is None
+
+
+def test_an_interval_of_a_slip_beyond_the_axes_ends_in_an_arrow_within_them(drawn, found):
+    wide = found.plate.friction_standard_uncertainty.copy()
+    wide[-1] = 50.0 * wide.max()
+    plate = dataclasses.replace(found.plate, friction_standard_uncertainty=wide)
+    for figure in PLATE_FIGURES:
+        with print_style():
+            (axes,) = figure.render(dataclasses.replace(drawn, plate=plate)).axes
+        low, high = axes.get_ylim()
+        (points,) = axes.containers
+        assert len(points[0].get_xdata()) == len(wide) - 1
+        drawn_bars = [path.vertices[:, 1] for bars in axes.collections[1:] for path in bars.get_paths()]
+        assert all(low <= bar.min() and bar.max() <= high for bar in drawn_bars)
+        arrows = {line.get_marker(): line.get_ydata() for line in axes.lines}
+        assert list(arrows[CARETUP]) == [high]
+        assert list(arrows[CARETDOWN]) == [low]

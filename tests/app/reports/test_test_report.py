@@ -4,6 +4,7 @@ import datetime
 import hashlib
 import re
 from itertools import pairwise
+from types import SimpleNamespace
 
 import msgspec
 import pytest
@@ -28,6 +29,7 @@ from app.reports.test_report.head import ReportHead
 from app.reports.test_report.render import printable, render_pdf, typeset_report, write_report
 from app.runs.analyze import repeat_saved_analysis
 from app.runs.campaign.collect import CollectOptions, collect_runs
+from app.runs.campaign.origin import CampaignOrigin
 from app.runs.errors import RunExistsError
 from app.version import __version__, commit
 
@@ -137,6 +139,7 @@ def test_reports_of_simulated_runs_say_so_first_and_name_their_origin(of_run, of
         first = report.sections[0].blocks[0]
         assert isinstance(first, Notice)
         assert first.text.startswith("SIMULATED: ")
+        assert report.mark == "SIMULATED"
     (facts,) = part(of_run, "Origin")
     rows = dict(facts.rows)
     assert rows["program"] == f"slipstand {__version__}" + (f" ({commit()})" if commit() else "")
@@ -219,6 +222,44 @@ def test_report_of_a_campaign_holds_table_effects_and_what_was_left_out(of_campa
     assert [row[0] for row in prints.rows] == ["a.h5", "b.h5", "c.h5"]
     assert any(section.title.startswith("What f_d depends on") for section in of_campaign.sections)
     assert str(folder) not in text_of(of_campaign), "a report says nothing of the computer it was made on"
+
+
+def test_the_mark_stands_on_each_page_and_tells_how_many_runs_are_simulated(of_campaign):
+    marked = render_pages(of_campaign, 40.0)
+    plain = render_pages(msgspec.structs.replace(of_campaign, mark=""), 40.0)
+    assert len(marked) == len(plain) > 2
+    assert all(one != other for one, other in zip(marked, plain, strict=True))
+
+    def details(source):
+        return SimpleNamespace(origin={"source": source})
+
+    runs = {"a": details("simulated"), "b": details("real")}
+    assert CampaignOrigin(runs=runs).mark == "SIMULATED: 1 of 2 runs"
+    assert CampaignOrigin(runs={"b": runs["b"]}).mark == ""
+
+
+def test_landscape_pages_of_a_campaign_follow_each_other(of_campaign):
+    """Each change of the orientation begins a page: small campaigns had two nearly empty ones."""
+    wide = [section.title for section in of_campaign.sections if section.wide]
+    first = next(place for place, section in enumerate(of_campaign.sections) if section.wide)
+    assert [section.title for section in of_campaign.sections[first:][: len(wide)]] == wide
+    assert wide[-1] == "Runs"
+
+
+def test_bounds_of_static_friction_are_left_out_where_it_is_known(tmp_path):
+    write_run(tmp_path / "s.h5", friction_static=0.2)
+    (results, _, tried) = part(made(tmp_path / "s.h5"), "Results")
+    named = [row[0] for row in results.rows]
+    assert "static friction" in named
+    assert not [name for name in named if name.startswith("static friction, at")]
+    assert "has no uncertainty" in tried.note
+    (friction,) = [row[2] for row in results.rows if row[0] == "dynamic friction"]
+    assert {len(row[1]) for row in tried.rows} == {len(friction)}
+
+
+def test_notes_below_a_table_are_sentences(of_campaign):
+    grids = [block for section in of_campaign.sections for block in section.blocks if isinstance(block, Grid)]
+    assert [grid.note for grid in grids if grid.note and not grid.note.endswith(".")] == []
 
 
 def test_numbers_in_sentences_have_true_minus_signs_and_names_their_hyphens():
