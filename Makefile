@@ -54,6 +54,8 @@ $(READY): requirements.lock pyproject.toml setup.py | system-libraries
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --quiet --no-deps --no-build-isolation --editable .
+	@echo "Compiling the numerical code, so that no first test waits: about a minute"
+	@$(BIN)/python -m tools.compile_all
 	@touch $@
 
 # Nothing is asked of systems without dpkg: their Qt wheels bring or find what they need.

@@ -49,7 +49,7 @@ def estimate_classically(record: Record, identification: Identification) -> Clas
     """
     if "friction_dynamic" not in identification.parameters:
         raise RecordError("nothing slipped in this record: there is no friction to check.")
-    decay = prepare(record)
+    decay = identification.free_decay or prepare(record)
     duration_s = float(decay.table.time_s[-1] - decay.release.time_s)
     period, decrement, uncertainty, cycles = _turning_points(_with_fitted_tail(decay, identification))
     motions = (_parameters(identification, friction).simulate(duration_s) for friction in FRICTION_GRID)

@@ -12,6 +12,7 @@ from analysis.quantities import BudgetLine, Quantity, ResultWarning
 
 if TYPE_CHECKING:  # which loads compiled code; windows show results without it
     from analysis.plate.friction import PlateFriction
+    from analysis.preparation.free_decay import FreeDecay
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,3 +142,4 @@ class Identification:
     monte_carlo: MonteCarlo | None = None  # where it was asked for
     plate: "PlateFriction | None" = None  # friction from the plate alone, slip by slip
     correlation: Correlation | None = None  # of those results whose errors are linear forms of a fit
+    free_decay: "FreeDecay | None" = None  # what was found in the record before laws were fitted to it

@@ -172,6 +172,7 @@ class _Fitted:
     """What was fitted to a record, and which of it was chosen."""
 
     search: Search
+    decay: FreeDecay  # as prepared
     minima: list[Floats]  # of the widest law, from which the laws were fitted
     fits: list[Fit]  # of friction laws on an ideal stand
     stand: StandFit | None
@@ -251,7 +252,7 @@ def _choose(
         joint = joint_fit.choose_law(record, decay, problem, fits)
         if stand_search is not None and joint.chosen is not likeliest:
             missing = _missing_effects(stand_search, decay, joint.chosen, [joint.chosen])
-    return _Fitted(search, minima, fits, stand, missing, joint, law_is_given=start is None)
+    return _Fitted(search, decay, minima, fits, stand, missing, joint, law_is_given=start is None)
 
 
 def _conclude(
@@ -316,6 +317,7 @@ def _conclude(
         drawn,
         plate,
         budget.correlation(),
+        fitted.decay,
     )
 
 

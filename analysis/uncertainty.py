@@ -68,7 +68,7 @@ class ParameterUncertainty:
 
 def propagate(problem: FitProblem, fit: Fit, block_s: float) -> ParameterUncertainty:
     """Distribution of the fitted parameters: noise as the residuals show it, and every stated source."""
-    residuals = (fit.table_residual_m, fit.relative_residual_m)
+    residuals = problem.residuals(fit.parameters, fit.law)
     shown = zip(residuals, problem.noise_m, _times(problem), strict=False)
     factors = [noise_variance_factor(residual / stated, times, block_s) for residual, stated, times in shown]
     return _propagate(problem, fit, factors)
@@ -173,7 +173,8 @@ def noise_variance_factor(residual: Floats, time_s: Floats, block_s: float) -> f
     edges = np.arange(time_s[0], time_s[-1], block_s)[1:]
     bounds = np.concatenate(([0], np.searchsorted(time_s, edges), [len(residual)]))
     counts = np.diff(bounds)
-    sums = np.diff(np.concatenate(([0.0], np.cumsum(residual)))[bounds])
+    sums = np.zeros(len(counts))
+    sums[counts > 0] = np.add.reduceat(residual, bounds[:-1][counts > 0])
     full = counts > 0.5 * np.median(counts)
     blocks = int(full.sum())
     if blocks < 4 or square == 0.0:

@@ -368,17 +368,19 @@ def motion_phases(parameters: Floats, law: FrictionLaw, duration_s: float) -> Fl
 def predict_gauge_1(parameters: Floats, time_s: Floats, law: FrictionLaw) -> Floats:
     """What gauge 1 should read (n,)."""
     u1, _ = sample_motion(parameters, time_s, law)
-    return np.asarray(parameters[Parameter.TABLE_OFFSET] + (1.0 + parameters[Parameter.TABLE_GAIN]) * u1)
+    u1 *= 1.0 + parameters[Parameter.TABLE_GAIN]
+    u1 += parameters[Parameter.TABLE_OFFSET]
+    return np.asarray(u1)
 
 
 def predict_gauge_2(parameters: Floats, time_s: Floats, law: FrictionLaw, gauge_2_absolute: bool) -> Floats:
     """What gauge 2 should read (n,), against the table or against the base."""
     u1, moved = sample_motion(parameters, time_s - parameters[Parameter.LAG], law)
     if gauge_2_absolute:
-        moved = moved + u1
-    return np.asarray(
-        parameters[Parameter.RELATIVE_OFFSET] + (1.0 + parameters[Parameter.RELATIVE_GAIN]) * moved
-    )
+        moved += u1
+    moved *= 1.0 + parameters[Parameter.RELATIVE_GAIN]
+    moved += parameters[Parameter.RELATIVE_OFFSET]
+    return np.asarray(moved)
 
 
 def _decimate(channel: Channel, samples: int, dense_until_s: float) -> Channel:

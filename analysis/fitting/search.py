@@ -1,5 +1,6 @@
 """Search for the lowest minimum of chi-square of each friction law, from a first guess on."""
 
+import math
 from collections.abc import Generator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -61,9 +62,8 @@ class Fit:
     """(k, k) Gauss-Newton curvature of half of chi-square over the free parameters, priors included."""
     chi_square: float  # of the readings alone
     bic: float
-    table_residual_m: Floats
-    """(n,) float64: reading minus curve."""
-    relative_residual_m: Floats
+    rms_m: float  # of reading minus curve, both gauges together
+    gauge_rms_m: tuple[float, float]  # of each; 0 without gauge 2
     departure: float  # chi-square of the parameters about what is stated of them: gains, lag, masses
 
     def value(self, parameter: Parameter) -> float:
@@ -73,11 +73,6 @@ class Fit:
         """Whether the record distinguishes this parameter from the others."""
         _, loose = covariance(self.normal_matrix)
         return bool((~loose[self.free == parameter]).all()) and parameter in self.free
-
-    @property
-    def rms_m(self) -> float:
-        both = np.concatenate((self.table_residual_m, self.relative_residual_m))
-        return float(np.sqrt(np.mean(both**2)))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -254,13 +249,17 @@ def may_be_friction(problem: FitProblem, fits: list[Fit]) -> bool:
 
 def fit_at_minimum(problem: FitProblem, law: FrictionLaw, minimum: Minimum) -> Fit:
     """Describe a minimum."""
-    table, relative = problem.residuals(minimum.parameters, law)
-    weights = np.square(problem.noise_m)
-    chi_square = float(table @ table / weights[0] + relative @ relative / weights[1])
+    residuals = problem.residuals(minimum.parameters, law)
+    squares, counts = [float(each @ each) for each in residuals], [max(1, len(each)) for each in residuals]
+    del residuals
+    chi_square = squares[0] / problem.noise_m[0] ** 2 + squares[1] / problem.noise_m[1] ** 2
+    rms_m = math.sqrt(sum(squares) / problem.sample_count)
+    gauge_rms_m = math.sqrt(squares[0] / counts[0]), math.sqrt(squares[1] / counts[1])
     bic = chi_square + len(problem.model_parameters(law)) * float(np.log(problem.sample_count))
     free = problem.free_parameters(law)
     point, departure = minimum.parameters, problem.departure(minimum.parameters)
-    return Fit(law, point, free, minimum.quadratic.normal, chi_square, bic, table, relative, departure)
+    normal = minimum.quadratic.normal
+    return Fit(law, point, free, normal, chi_square, bic, rms_m, gauge_rms_m, departure)
 
 
 def _reading_count(problem: FitProblem) -> int:

@@ -170,7 +170,8 @@ class StandSearch:
         self.problem = extended_problem(search.problem)
         self._searched = _with_known_masses(self.problem)
         self._informed = _with_wide_priors(_with_known_masses(extended_problem(search.informed_problem)))
-        self._left_by_ideal = [Channel(search.problem.table.time_s, ideal.table_residual_m)]
+        left, _ = search.problem.residuals(ideal.parameters, ideal.law)
+        self._left_by_ideal = [Channel(search.problem.table.time_s, left)]
         if tail is not None:
             time_s = np.linspace(tail.start_s, tail.end_s, len(tail.residual_m))
             self._left_by_ideal.append(Channel(time_s, tail.residual_m))

@@ -8,7 +8,13 @@ from numpy.typing import NDArray
 
 from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
-from analysis.preparation.sums import cubic_weights, wave_amplitudes, windows
+from analysis.preparation.sums import (
+    median_of_five,
+    off_cubic,
+    wave_amplitudes,
+    widest_intervals,
+    window_means,
+)
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import Record, RecordError, StandMasses
 from messages.i18n import N_
@@ -35,7 +41,8 @@ class Channel:
         return Channel(self.time_s[first:last], self.value_m[first:last])
 
     def scaled(self, factor: float) -> "Channel":
-        return Channel(self.time_s, self.value_m * factor)
+        """The same where `factor` is 1."""
+        return self if factor == 1.0 else Channel(self.time_s, self.value_m * factor)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -68,15 +75,13 @@ def read_channels(record: Record) -> tuple[Channels, list[ResultWarning]]:
     check_masses(record.masses)
     check_gauges(record)
     _check_columns(record)
-    time_s = (record.time_s - record.time_s[0]).astype(np.float64) * record.clock_scale
+    time_s = (record.time_s - record.time_s[0]).astype(np.float64, copy=False)
+    time_s *= record.clock_scale
     warnings: list[ResultWarning] = []
     table_valid = _valid(
         record.table_displacement_m, record.table_overload, record.table_gauge.range_m, gauge=1
     )
-    table = Channel(
-        time_s[table_valid] - record.table_gauge.lateness_s,
-        record.table_displacement_m[table_valid].astype(np.float64),
-    )
+    table = _chosen(record.table_displacement_m, table_valid, time_s, record.table_gauge.lateness_s)
     relative = None
     if record.relative_displacement_m is not None:
         relative = _relative(record, record.relative_displacement_m, time_s, warnings)
@@ -193,13 +198,22 @@ def _relative(
         template = N_("{error} The friction comes from the table channel alone.")
         warnings.append(result_warning("gauge-2-absent", template, error=error))
         return None
-    return Channel(time_s[valid] - gauge.lateness_s, value_m[valid].astype(np.float64))
+    return _chosen(value_m, valid, time_s, gauge.lateness_s)
+
+
+def _chosen(value_m: Floats, valid: NDArray[np.bool_], time_s: Floats, lateness_s: float) -> Channel:
+    """The valid readings on true time; no copies where none is needed, as of a million readings."""
+    whole = bool(valid.all())
+    times = time_s if whole else time_s[valid]
+    values = np.require(value_m if whole else value_m[valid], np.float64, ("C", "W"))
+    return Channel(times - lateness_s if lateness_s else times, values)
 
 
 _SPIKE_SIGMAS = 9.0
 _SPIKE_SHARE_MAX = 0.02
 """More readings than this do not stand out by accident: they are not spikes but something else."""
 _PASSES = 8
+_NEIGHBOURS = np.array([-2, -1, 1, 2])
 _WIDE = 4.0
 """A distance from the median of five beyond so many times what 97 % of the readings keep is a spike."""
 _JUMP = 0.6  # a motion that starts or stops goes a third of its next step at most in the first
@@ -209,7 +223,6 @@ _FROZEN_MAX = 0.2  # a gauge that stands still for longer than this share of the
 _CLIPPED_RUN = 4
 _READINGS_MIN = 16
 _GAP = 3.5  # readings this many median intervals apart are no neighbours
-_EVEN = 35.0 / 18.0  # 1 + sum of squared weights of the cubic at even times
 _KINK_M_PER_S2 = 4.0
 """A jump of acceleration, of 20 m/s2 at most, moves a reading off the cubic by a tenth of it times an
 interval squared; intervals are not all alike."""
@@ -303,44 +316,29 @@ def _spikes(channel: Channel) -> NDArray[np.bool_]:
     found = np.zeros(len(x), dtype=bool)
     if len(x) < _READINGS_MIN:
         return found
-    weights, widest_s = cubic_weights(channel.time_s)
+    widest_s = widest_intervals(channel.time_s)
     even = widest_s < _GAP * float(np.median(np.diff(channel.time_s)))
     # What a kink in the motion (a slip that begins or ends) or a converter's step may look like.
     coarse = float(np.quantile(np.abs(np.diff(x, 2)), 0.9)) + 3.0 * quantisation_m(x)
     kink = coarse + _KINK_M_PER_S2 * np.where(even, widest_s, 0.0) ** 2
-    off = np.where(even, x - _median_of_five(x), 0.0)
+    off = np.where(even, x - median_of_five(x), 0.0)
     found |= np.abs(off) > _WIDE * (float(np.quantile(np.abs(off), 0.97)) + kink)
-    smooth = np.where(found, np.interp(channel.time_s, channel.time_s[~found], x[~found]), x)
+    smooth = x.copy()
+    if found.any():
+        smooth[found] = np.interp(channel.time_s[found], channel.time_s[~found], x[~found])
     for _ in range(_PASSES):
-        off = _off_cubic(smooth, weights)
-        limit = _SPIKE_SIGMAS * 1.4826 * float(np.median(np.abs(off[even]))) + kink
-        largest = np.abs(off)
-        for shift in (-2, -1, 1, 2):
-            largest = np.maximum(largest, np.abs(np.roll(off, shift)))
-        spikes = (np.abs(off) > limit) & (np.abs(off) >= largest) & even
-        if not spikes.any():
+        off = off_cubic(channel.time_s, smooth)
+        size = np.abs(off)
+        typical = float(np.median(size[even]))
+        far = np.flatnonzero((size > _SPIKE_SIGMAS * 1.4826 * typical + kink) & even)  # none at the ends
+        spikes = far[(size[far] >= size[far + _NEIGHBOURS[:, None]]).all(axis=0)]
+        if not len(spikes):
             break
         smooth[spikes] -= off[spikes]
-        found |= spikes
+        found[spikes] = True
     if found.mean() > _SPIKE_SHARE_MAX:
         found[:] = False
     return found
-
-
-def _median_of_five(x: Floats) -> Floats:
-    padded = np.concatenate((x[:1], x[:1], x, x[-1:], x[-1:]))
-    a, b, c, d, e = (padded[k : k + len(x)] for k in range(5))
-    low = np.maximum(np.minimum(a, b), np.minimum(d, e))
-    high = np.minimum(np.maximum(a, b), np.maximum(d, e))  # the median is that of `low`, `high` and c
-    return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))
-
-
-def _off_cubic(x: Floats, weights: Floats) -> Floats:
-    """Reading minus the cubic through its four neighbours, in the scale of even times; zero at the ends."""
-    off = np.zeros_like(x)
-    curve = sum(w[2:-2] * y for w, y in zip(weights, (x[:-4], x[1:-3], x[3:-1], x[4:]), strict=True))
-    off[2:-2] = (x[2:-2] - curve) * np.sqrt(_EVEN / (1.0 + np.sum(weights[:, 2:-2] ** 2, axis=0)))
-    return off
 
 
 NOISE_FLOOR_M = 1e-9  # noise below this is not believed: the readings are computed, not measured
@@ -451,10 +449,11 @@ def remove_drift(channel: Channel, drift_m_per_s: float, zero_s: float) -> Chann
 
 def _line(channel: Channel, noise_m: float) -> tuple[float, float]:
     """Slope of readings in time and its standard uncertainty from their scatter, `noise_m` at least."""
-    t = channel.time_s - channel.time_s.mean()
-    slope, level = np.polyfit(t, channel.value_m, 1)
-    scatter = max(noise_m, float(np.std(channel.value_m - slope * t - level)))
-    return float(slope), scatter / float(np.sqrt(t @ t))
+    t, x = channel.time_s - channel.time_s.mean(), channel.value_m - channel.value_m.mean()
+    square = float(t @ t)
+    slope = float(t @ x) / square
+    scatter = max(noise_m, float(np.std(x - slope * t)))
+    return slope, scatter / float(np.sqrt(square))
 
 
 MAINS_HZ = (50.0, 60.0)
@@ -522,8 +521,5 @@ def _amplitudes(block: Channel) -> Floats | None:
 
 def _means(channel: Channel, window_s: float) -> Floats:
     """Mean of the readings within half of `window_s` of each."""
-    t, x = channel.time_s, channel.value_m
     half_s = 0.5 * window_s * (1.0 + 1e-6)  # even windows, whatever rounding does to times
-    first, last = windows(t, half_s)
-    sums = np.concatenate(([0.0], np.cumsum(x - x.mean())))
-    return np.asarray((sums[last] - sums[first]) / (last - first) + x.mean())
+    return window_means(channel.time_s, channel.value_m, half_s)

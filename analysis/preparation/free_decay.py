@@ -224,8 +224,8 @@ def prepare(record: Record) -> FreeDecay:
     Raises RecordError if there is none.
     """
     warnings: list[ResultWarning] = []
-    channels = _valid_channels(record, warnings)
-    release = _choose_release(oscillation.find_releases(channels.table), record.release, warnings)
+    channels, hum = _valid_channels(record, warnings)
+    release = _choose_release(oscillation.find_releases_beside(hum, channels.table), record.release, warnings)
     if record.decay_end_s is not None:
         end_s = min(channels.from_record_time(record.decay_end_s), release.end_s)
         release = replace(release, end_s=end_s)
@@ -286,8 +286,10 @@ def fit_tail(
         return None
 
 
-def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:
-    """Readings that the gauges can have seen."""
+def _valid_channels(
+    record: Record, warnings: list[ResultWarning]
+) -> tuple[Channels, tuple[float, float] | None]:
+    """Readings that the gauges can have seen, and the hum of gauge 1."""
     channels, found = read_channels(record)
     warnings += found
     if record.relative_displacement_m is None:
@@ -298,11 +300,9 @@ def _valid_channels(record: Record, warnings: list[ResultWarning]) -> Channels:
     table, relative = remove_invalid_readings(channels.table, 1, warnings), channels.relative
     if relative is not None:
         relative = _if_mostly_valid(relative, remove_invalid_readings(relative, 2, warnings), warnings)
-    for gauge, channel in ((1, table), (2, relative)):
-        hum = None if channel is None else detect_hum(channel)
-        if hum is not None:
-            warnings.append(hum_warning(gauge, hum))
-    return replace(channels, table=table, relative=relative)
+    hums = (detect_hum(table), None if relative is None else detect_hum(relative))
+    warnings += [hum_warning(gauge, hum) for gauge, hum in enumerate(hums, 1) if hum is not None]
+    return replace(channels, table=table, relative=relative), hums[0]
 
 
 def _if_mostly_valid(readings: Channel, valid: Channel, warnings: list[ResultWarning]) -> Channel | None:

@@ -12,7 +12,7 @@ from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
 from analysis.laws.parameters import FRICTION_MAX, PERIOD_MAX_S, PERIOD_MIN_S, TRAVEL_MAX_M
 from analysis.preparation.channels import NOISE_FLOOR_M, Channel, detect_hum, remove_hum
-from analysis.preparation.sums import swing_equations, windows
+from analysis.preparation.sums import swing_equations, swing_residual, window_slopes
 from analysis.quantities import ResultWarning, result_warning
 from analysis.record import RecordError
 from messages.i18n import N_
@@ -62,7 +62,12 @@ def find_releases(table: Channel) -> list[Release]:
 
     Raises RecordError when gauge 1 shows no free oscillation.
     """
-    smooth, noise = remove_hum(median_of_three(table), detect_hum(table)), white_noise(table)
+    return find_releases_beside(detect_hum(table), table)
+
+
+def find_releases_beside(hum: tuple[float, float] | None, table: Channel) -> list[Release]:
+    """`find_releases` where the hum of the mains is known as `detect_hum` gives it."""
+    smooth, noise = remove_hum(median_of_three(table), hum), white_noise(table)
     releases: list[Release] = []
     start_s, last_s = float(table.time_s[0]), float(table.time_s[-1])
     while True:
@@ -90,15 +95,7 @@ def median_of_three(channel: Channel) -> Channel:
 
 def local_slopes(channel: Channel, half_window_s: float) -> Floats:
     """Slope of the line through readings within +-half_window_s of each time (m/s); times may be uneven."""
-    t, x = channel.time_s - channel.time_s[0], channel.value_m - channel.value_m.mean()
-    index = np.arange(len(t))
-    first, last = windows(t, half_window_s)
-    first, last = np.minimum(first, np.maximum(index - 2, 0)), np.maximum(last, np.minimum(index + 3, len(t)))
-    sums = [np.concatenate(([0.0], np.cumsum(y))) for y in (t, x, t * t, t * x)]
-    s_t, s_x, s_tt, s_tx = (total[last] - total[first] for total in sums)
-    count = last - first
-    spread = s_tt - s_t * s_t / count
-    return np.asarray((s_tx - s_t * s_x / count) / np.where(spread > 0.0, spread, np.inf))
+    return window_slopes(channel.time_s, channel.value_m, half_window_s)
 
 
 def white_noise(channel: Channel) -> float:
@@ -564,20 +561,26 @@ def no_decay_error(length_s: float) -> RecordError:
     )
 
 
+_ROWS = 1 << 16  # readings whose derivatives are in memory at once
+
+
 def envelope_curvature(channel: Channel, decay: DampedCosine) -> float:
     """How far the log of the envelope bends, in standard deviations of the noise; negative for dry friction.
 
     The significance of q in an envelope exp(-n tau + q tau^2), from one step of least squares.
     """
-    tau = channel.time_s - decay.start_s
-    curve, columns = damped_cosine(decay.parameters, tau)
-    rows = np.vstack((columns, tau**2 * (curve - decay.offset_m)))
-    scale = np.sqrt(np.sum(rows**2, axis=1))
-    rows = rows / scale[:, None]
-    inverse = np.linalg.inv(rows @ rows.T)
+    normal, descent = np.zeros((6, 6)), np.zeros(6)
+    for first in range(0, len(channel), _ROWS):
+        tau = channel.time_s[first : first + _ROWS] - decay.start_s
+        curve, columns = damped_cosine(decay.parameters, tau)
+        rows = np.vstack((columns, tau**2 * (curve - decay.offset_m)))
+        normal += rows @ rows.T
+        descent += rows @ decay.residual_m[first : first + _ROWS]
+    scale = np.sqrt(np.diag(normal))
+    inverse = np.linalg.inv(normal / np.outer(scale, scale))
     if not inverse[-1, -1] > 0.0:  # the tail is too short to tell a bend from damping
         return 0.0
-    bend = inverse @ (rows @ decay.residual_m)
+    bend = inverse @ (descent / scale)
     return float(bend[-1] / np.sqrt(inverse[-1, -1])) / max(decay.rms_m, 1e-12)
 
 
@@ -620,11 +623,11 @@ def _is_swing(parameters: Floats, length_s: float) -> bool:
 
 def _finished(channel: Channel, parameters: Floats) -> DampedCosine:
     tau = channel.time_s - channel.time_s[0]
-    curve, columns = damped_cosine(parameters, tau)
-    residual = channel.value_m - curve
+    residual = swing_residual(parameters, tau, channel.value_m)
     variance = float(residual @ residual) / max(1, len(tau) - 5)
+    normal = swing_equations(parameters, tau, channel.value_m)[:5, :5]
     try:
-        covariance = np.asarray(variance * np.linalg.inv(columns @ columns.T), dtype=np.float64)
+        covariance = np.asarray(variance * np.linalg.inv(normal), dtype=np.float64)
     except np.linalg.LinAlgError:
         raise no_decay_error(float(tau[-1])) from None
     return DampedCosine(float(channel.time_s[0]), float(channel.time_s[-1]), parameters, covariance, residual)

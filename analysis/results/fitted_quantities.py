@@ -537,7 +537,7 @@ def _fitted_slip_end(joint: JointFit, largest: float) -> SlipEnd | None:
     end = _end_of(chosen.parameters, chosen.law, end_s)
     if end is None:
         return None
-    price = _PLAUSIBLE * float(np.log(len(chosen.table_residual_m) + len(chosen.relative_residual_m)))
+    price = _PLAUSIBLE * float(np.log(joint.problem.sample_count))
     plausible = [fit for fit in joint.candidates if fit.bic <= chosen.bic + price]
     return SlipEnd(end, max(_scatter(fit, end, end_s, largest) for fit in plausible))
 

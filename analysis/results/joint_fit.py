@@ -60,12 +60,12 @@ def assess_model(
     `noise_readings` is the number of readings from which the noise of each gauge was measured.
     """
     adequate = True
-    residuals = (chosen.table_residual_m, chosen.relative_residual_m)
+    residuals = problem.residuals(chosen.parameters, chosen.law)
     channels = (problem.table, problem.relative or problem.table)
     gauges = zip(residuals, channels, problem.noise_m, noise_readings, strict=True)
     for residual, channel, noise, readings in gauges:
         if len(residual):
-            white = _white(residual / noise, channel.time_s, period_s)
+            white = _white(residual, noise, channel.time_s, period_s)
             adequate &= _small_enough(residual, noise, readings) and white
     tried = tuple(
         FittedModel(f.law.name, f.bic, f.rms_m, float(f.parameters[0]), _parts(f.law)) for f in fits
@@ -138,20 +138,20 @@ def tail_warnings(decay: FreeDecay) -> Iterator[ResultWarning]:
 
 
 def _small_enough(residual: Floats, noise_m: float, noise_readings: int) -> bool:
-    ratio = float(np.mean(residual**2)) / noise_m**2
+    ratio = float(residual @ residual) / len(residual) / noise_m**2
     spread = np.sqrt(2.0 / len(residual) + 2.0 / max(2, noise_readings))
     return ratio <= float(np.exp(_BAND * spread))
 
 
-def _white(residual: Floats, time_s: Floats, period_s: float) -> bool:
+def _white(residual: Floats, noise_m: float, time_s: Floats, period_s: float) -> bool:
     """Tell whether means over eighths of a period scatter like those of white noise of the same size."""
     edges = np.arange(time_s[0], time_s[-1], period_s / 8.0)
     bounds = np.concatenate(([0], np.searchsorted(time_s, edges[1:]), [len(residual)]))
     counts = np.diff(bounds)
-    sums = np.diff(np.concatenate(([0.0], np.cumsum(residual)))[bounds])
     used = counts > 0
-    square = max(float(np.mean(residual**2)), _NEGLIGIBLE)
-    scatter = float(np.sum(sums[used] ** 2 / counts[used])) / square
+    sums = np.add.reduceat(residual, bounds[:-1][used]) / noise_m
+    square = max(float(residual @ residual) / len(residual) / noise_m**2, _NEGLIGIBLE)
+    scatter = float(np.sum(sums**2 / counts[used])) / square
     # Chi-square stays below this limit in 99.95 % (Wilson and Hilferty).
     freedom = int(used.sum())
     small = 2.0 / (9.0 * freedom)
@@ -382,6 +382,8 @@ def constants_from_tail(record: Record, decay: FreeDecay) -> DecayConstants:
 
 def _shift_by_bend(record: Record, decay: FreeDecay, tail: DampedCosine) -> Floats:
     """Shift (2,) of n1 and w by one standard uncertainty of the non-linearity of a gauge."""
+    if record.table_gauge.nonlinearity_m == 0.0:
+        return np.zeros(2)
     tau_s = np.linspace(0.0, tail.end_s - tail.start_s, len(tail.residual_m))
     curve, slopes = damped_cosine(tail.parameters, tau_s)
     bend = record.table_gauge.nonlinearity_at(curve, tail.offset_m, 0.5 * range_m(decay.table.value_m))

@@ -76,11 +76,11 @@ class MonteCarloModel:
         stretch = 1.0 + self.joint.record.clock_scale_uncertainty * rng.standard_normal()
         chosen = self.joint.chosen
         table = predict_gauge_1(truth, problem.table.time_s * stretch, chosen.law)
-        table = table + _rms(chosen.table_residual_m) * rng.standard_normal(len(table))
+        table = table + chosen.gauge_rms_m[0] * rng.standard_normal(len(table))
         relative = problem.relative
         if relative is not None:
             second = predict_gauge_2(truth, relative.time_s * stretch, chosen.law, problem.gauge_2_absolute)
-            second = second + _rms(chosen.relative_residual_m) * rng.standard_normal(len(second))
+            second = second + chosen.gauge_rms_m[1] * rng.standard_normal(len(second))
             relative = Channel(relative.time_s, second)
         return replace(problem, table=Channel(problem.table.time_s, table), relative=relative), truth
 
@@ -144,10 +144,6 @@ def _refits(
             if progress is not None:
                 progress(count)
     return np.array(found).reshape(-1, len(drawing.joint.chosen.parameters) + len(_CONSTANTS))
-
-
-def _rms(residual_m: Floats) -> float:
-    return float(np.sqrt(np.mean(residual_m**2)))
 
 
 def _quantity(draws: Floats, unit: str) -> Quantity:
