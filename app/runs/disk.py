@@ -11,8 +11,10 @@ import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
+from app.runs.batch.parent_watchdog import cleared_at_end
 from app.runs.errors import DiskFullError, RunError, RunExistsError, WriteError
 from config.durable_files import (
     file_in_use,
@@ -198,14 +200,13 @@ def atomic_write(path: Path, *, replace: bool = False) -> Iterator[Path]:
     try:
         if not replace and os.path.lexists(path):
             raise FileExistsError(str(path))
-        yield temporary
-        sync_file(temporary)
-        if replace:
-            replace_file(temporary, path)
-        else:
-            give_new_name(temporary, path)
-        sync_folder(path.parent)
+        with cleared_at_end(partial(remove_file, temporary)):
+            yield temporary
+            sync_file(temporary)
+            if replace:
+                replace_file(temporary, path)
+            else:
+                give_new_name(temporary, path)
+            sync_folder(path.parent)
     except OSError as error:
         raise storage_error(path, error) from None
-    finally:
-        remove_file(temporary)

@@ -3,11 +3,13 @@
 import datetime
 import shutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import h5py
 
 from app.runs import schema
+from app.runs.batch.parent_watchdog import cleared_at_end, end_held, leave_if_asked
 from app.runs.columns import check_column, checksum, is_finished, sample_paths
 from app.runs.disk import check_free_space, storage_error, sync_file, temporary_copy
 from app.runs.errors import UnsuitableRunError, WriteError, being_recorded, no_such_run
@@ -32,9 +34,10 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
     path = path.resolve()  # of a link the file is replaced, not the link
     if is_being_recorded(path):
         raise being_recorded(path)
-    copy = temporary_copy(path)
+    copy, lock = temporary_copy(path), editing_lock(path)
     try:
-        with editing_lock(path):
+        with end_held(), cleared_at_end(partial(_clear, lock, copy)):
+            lock.acquire()
             _make_copy(path, copy, change)
             replace_file(copy, path)
             sync_folder(path.parent)
@@ -44,15 +47,22 @@ def rewrite(path: Path, change: Callable[[h5py.File], None]) -> None:
         raise no_such_run(path) from None
     except (OSError, RuntimeError) as error:
         raise storage_error(path, error) from None
-    finally:
+
+
+def _clear(lock: FileLock, copy: Path) -> None:
+    try:
         remove_file(copy)
+    finally:
+        lock.release()
 
 
 def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> None:
     check_free_space(path.parent, path.stat().st_size + _ROOM_BYTES)
     remove_file(copy)
     with path.open("rb") as file, copy.open("xb") as made:  # which follows no link of that name
-        shutil.copyfileobj(file, made, _PIECE_BYTES)
+        while piece := file.read(_PIECE_BYTES):
+            made.write(piece)
+            leave_if_asked()
     shutil.copymode(path, copy)
     with h5py.File(copy, "r+", locking="best-effort") as file:
         if not is_finished(file):
@@ -62,6 +72,7 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
         before = _measured(file)
         for name, value in before.items():
             check_column(file[name], value, path)
+        leave_if_asked()
         change(file)
         file.attrs["file_update_time"] = datetime.datetime.now().astimezone().isoformat(timespec="seconds")
     with h5py.File(copy, "r", locking="best-effort") as file:
@@ -71,7 +82,9 @@ def _make_copy(path: Path, copy: Path, change: Callable[[h5py.File], None]) -> N
                 "{path}: its copy does not read back as written. Check the disk; the run is unharmed",
                 path=path,
             )
+    leave_if_asked()
     sync_file(copy)
+    leave_if_asked()
 
 
 def _measured(file: h5py.File) -> dict[str, int]:

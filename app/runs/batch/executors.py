@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import msgspec
 
 from app.child_process import hold_interrupts
-from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent
+from app.runs.batch.parent_watchdog import PipeEnd, exit_with_parent, is_asked_to_end, leave_at_once
 from app.runs.errors import ClusterError, ExtraMissingError, one_line
 from app.version import __version__
 from messages.i18n import N_
@@ -158,7 +158,7 @@ class ProcessExecutor(Executor):
         if sys.platform != "win32":
             resource_tracker.ensure_running()  # its start would let interrupts through
         with hold_interrupts():
-            return self._started().submit(work, item)
+            return self._started().submit(_do, work, item)
 
     def renew(self) -> None:
         _log.warning("a worker process died; the workers are replaced")
@@ -302,6 +302,19 @@ def _begin(lifeline: PipeEnd, one_at_a_time: Lock, prepare: Callable[[], None]) 
     exit_with_parent(lifeline)
     with one_at_a_time:
         prepare()
+
+
+def _do(work: Callable[[Item], Answer], item: Item) -> Answer:
+    """Do `work` in a worker process, which begins no more of it once its owner has gone.
+
+    The pool takes SystemExit for an answer, and begins the next item.
+    """
+    if is_asked_to_end():
+        leave_at_once()
+    try:
+        return work(item)
+    except SystemExit:
+        leave_at_once()
 
 
 def _connect(address: str) -> Any:

@@ -1,5 +1,6 @@
 """A pipe whose other end is held by whoever started a process: when that goes, so does the process."""
 
+import atexit
 import contextlib
 import io
 import os
@@ -8,6 +9,7 @@ import sys
 import threading
 import time
 from _thread import interrupt_main
+from collections.abc import Callable, Iterator
 from multiprocessing import connection
 from typing import NoReturn, TypeAlias
 
@@ -17,6 +19,10 @@ else:
     PipeEnd: TypeAlias = connection.Connection
 
 _GRACE_S = 2.0  # to clear away half-written copies, on a busy computer too
+_asked = threading.Event()
+"""Set when the process is to end."""
+_clearing: dict[object, Callable[[], object]] = {}
+_holding: set[object] = set()
 
 
 def exit_with_parent(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:
@@ -25,14 +31,62 @@ def exit_with_parent(lifeline: PipeEnd, grace_s: float = _GRACE_S) -> None:
     `SystemExit` is raised in the main thread, which calls this: `grace_s` is left to clear away copies and
     executors.
     """
+    atexit.register(_clear)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the owner decides when to end
     signal.signal(signal.SIGTERM, _leave)
     threading.Thread(target=_end_with_owner, args=(lifeline, grace_s), name="owner", daemon=True).start()
 
 
-def _leave(_number: int, _frame: object) -> NoReturn:
+def is_asked_to_end() -> bool:
+    """Tell whether the owner of this process has gone, or wants it to end."""
+    return _asked.is_set()
+
+
+def leave_if_asked() -> None:
+    """Raise SystemExit if this process is to end: a good moment inside `end_held`."""
+    if _asked.is_set():
+        raise SystemExit(1)
+
+
+def leave_at_once() -> NoReturn:
+    """End this process now, with what `cleared_at_end` has to clear away."""
+    _clear()
+    os._exit(1)
+
+
+@contextlib.contextmanager
+def cleared_at_end(clear: Callable[[], object]) -> Iterator[None]:
+    """Call `clear` after the block, and also where this process has to end within it."""
+    key = object()
+    _clearing[key] = clear
+    try:
+        yield
+    finally:
+        clear()
+        del _clearing[key]
+
+
+@contextlib.contextmanager
+def end_held() -> Iterator[None]:
+    """Let the end of the owner break off the block by `leave_if_asked` alone, or at the end of the block.
+
+    What hangs in it longer than the grace is ended all the same.
+    """
+    key = object()
+    _holding.add(key)
+    try:
+        yield
+    finally:
+        _holding.discard(key)
+        if not _holding:
+            leave_if_asked()
+
+
+def _leave(_number: int, _frame: object) -> None:
+    _asked.set()
     _discard_stderr()
-    raise SystemExit(1)
+    if not _holding:
+        raise SystemExit(1)
 
 
 def _discard_stderr() -> None:
@@ -57,4 +111,10 @@ def _end_with_owner(lifeline: PipeEnd, grace_s: float) -> None:
     else:
         interrupt_main(signal.SIGTERM)
     time.sleep(grace_s)  # so that files are cleared away
-    os._exit(1)
+    leave_at_once()
+
+
+def _clear() -> None:
+    for clear in list(_clearing.values()):
+        with contextlib.suppress(Exception):
+            clear()

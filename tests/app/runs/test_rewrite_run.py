@@ -1,5 +1,8 @@
+import itertools
 import shutil
+import signal
 import sys
+import threading
 
 import h5py
 import numpy as np
@@ -7,6 +10,7 @@ import pytest
 from runs_kit import ENDING, block, small_run
 
 from app.runs import rewrite as rewrite_module
+from app.runs.batch import parent_watchdog
 from app.runs.edits import edit_run
 from app.runs.errors import (
     BeingRecordedError,
@@ -153,3 +157,49 @@ def test_a_copy_that_does_not_read_back_is_not_put_in_place(run_path, monkeypatc
     with pytest.raises(WriteError, match="the run is unharmed"):
         rewrite(run_path, _nothing)
     assert run_path.read_bytes() == before
+
+
+TRACED = ("rewrite.py", "lock.py", "durable_files.py", "disk.py", "parent_watchdog.py", "contextlib.py")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals as Windows has none")
+def test_a_process_that_is_ended_at_any_moment_of_a_change_leaves_nothing(run_path, monkeypatch):
+    """The signal comes after each line of all that takes part, one after another."""
+    monkeypatch.setattr(parent_watchdog, "_asked", threading.Event())
+    monkeypatch.setattr(parent_watchdog, "_discard_stderr", lambda: None)
+    earlier = signal.signal(signal.SIGTERM, parent_watchdog._leave)
+    ends, moment = 0, 0
+    try:
+        while ended_at(moment, run_path):
+            ends, moment = ends + 1, moment + 1
+            parent_watchdog._clear()  # what the process does last
+            parent_watchdog._asked.clear()
+            assert [path.name for path in run_path.parent.iterdir()] == ["run.h5"], f"line {moment}"
+            assert not parent_watchdog._holding
+    finally:
+        sys.settrace(None)
+        signal.signal(signal.SIGTERM, earlier)
+    assert ends > 50
+    assert open_run(run_path).identifier
+
+
+def ended_at(moment, run_path):
+    """Rewrite a run and be told to end at a line; whether so many lines were run."""
+    lines = itertools.count()
+
+    def trace(frame, event, _argument):
+        if event == "call" and not frame.f_code.co_filename.endswith(TRACED):
+            return None
+        if event == "line" and next(lines) == moment:
+            sys.settrace(None)
+            signal.raise_signal(signal.SIGTERM)
+        return trace
+
+    sys.settrace(trace)
+    try:
+        rewrite(run_path, _nothing)
+    except SystemExit:
+        return True
+    finally:
+        sys.settrace(None)
+    return False

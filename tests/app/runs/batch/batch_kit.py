@@ -1,9 +1,13 @@
 """Functions for worker processes and clusters."""
 
+import contextlib
 import os
 import signal
 import time
+import uuid
 from pathlib import Path
+
+from app.runs.rewrite import rewrite
 
 
 def doubled(number: int) -> int:
@@ -43,5 +47,23 @@ def waiting(folder: str) -> None:
         half.unlink()
 
 
+def waiting_apart(folder: str) -> None:
+    """Leave a file for each call, and do as `waiting` does."""
+    (Path(folder) / f"{uuid.uuid4().hex}.begun").touch()
+    waiting(folder)
+
+
 def nothing() -> None:
     pass
+
+
+def rewriting_for_ever(path: str, change_begins: str) -> None:
+    """Rewrite a run and hang while its copy is changed, as a library does that passes no exception on."""
+
+    def hang(_file: object) -> None:
+        Path(change_begins).touch()
+        while True:
+            with contextlib.suppress(SystemExit):
+                time.sleep(0.01)
+
+    rewrite(Path(path), hang)

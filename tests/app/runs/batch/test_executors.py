@@ -4,9 +4,11 @@ import os
 import time
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
+from functools import partial
 
 import pytest
-from batch_kit import doubled, failing, fatal, nothing, waiting
+from batch_kit import doubled, failing, fatal, nothing, rewriting_for_ever, waiting, waiting_apart
+from runs_kit import small_run
 
 from app.runs.batch.executors import (
     Executor,
@@ -124,6 +126,31 @@ def test_work_is_given_up_at_once_and_leaves_nothing(tmp_path):
         for pid in running:
             with pytest.raises(ProcessLookupError):
                 os.kill(pid, 0)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows wakes no sleeper; real work does not sleep")
+def test_work_that_waits_in_the_queue_is_not_begun_once_it_is_given_up(tmp_path):
+    crew = ProcessExecutor(1, nothing)
+    for _ in range(4):
+        crew.submit(waiting_apart, str(tmp_path))
+    while not list(tmp_path.glob("*.half")):
+        time.sleep(0.02)
+    crew.close(now=True)
+    assert [path.suffix for path in tmp_path.iterdir()] == [".begun"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows removes no file that is open")
+def test_a_change_of_a_run_that_hangs_leaves_nothing_when_it_is_given_up(tmp_path, metadata):
+    run = tmp_path / "run.h5"
+    small_run(run, metadata)
+    crew = ProcessExecutor(1, nothing)
+    begun = tmp_path / "begun"
+    crew.submit(partial(rewriting_for_ever, change_begins=str(begun)), str(run))
+    while not begun.exists():
+        time.sleep(0.02)
+    assert len(list(tmp_path.iterdir())) == 4, "the copy and its lock"
+    crew.close(now=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["begun", "run.h5"]
 
 
 def test_few_runs_are_done_here_and_many_in_processes():
