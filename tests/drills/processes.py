@@ -6,6 +6,8 @@ import sys
 import time
 from pathlib import Path
 
+from tests.waiting import PATIENCE_S
+
 
 def children_of(process_id: int) -> list[int]:
     """Processes that a process has started; empty where the system does not tell so simply."""
@@ -22,11 +24,11 @@ def descendants_of(process_id: int) -> list[int]:
     return found + [further for child in found for further in descendants_of(child)]
 
 
-def gone(process_id: int, patience_s: float = 20.0) -> bool:
+def gone(process_id: int, patience_s: float = PATIENCE_S) -> bool:
     """Wait until a process has ended; one that waits to be collected has."""
-    deadline = time.monotonic() + patience_s
+    deadline = time.perf_counter() + patience_s
     while is_alive(process_id):
-        if time.monotonic() > deadline:
+        if time.perf_counter() > deadline:
             return False
         time.sleep(0.02)
     return True

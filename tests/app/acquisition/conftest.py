@@ -6,6 +6,7 @@ import threading
 import pytest
 
 from app.runs.writer_client import WriterClient
+from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture(scope="module")
@@ -28,9 +29,9 @@ def writer():
 
 @pytest.fixture
 def no_thread_is_left():
-    """What feeds a journal or closes a run has ended within five seconds of its test."""
+    """What feeds a journal or closes a run has ended by the end of its test."""
     yield
     for thread in threading.enumerate():
         if thread.name in ("journal", "closing"):
-            thread.join(5.0)
+            thread.join(PATIENCE_S)
             assert not thread.is_alive()

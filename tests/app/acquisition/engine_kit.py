@@ -19,6 +19,7 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import settings_file
+from tests.waiting import PATIENCE_S, wait_until
 
 QUICK = {"rest_s": 0.5, "pull_s": 0.3, "hold_s": 0.4, "decay_s": 1.6, "recentre_s": 0.4, "rate_hz": 1000.0}
 RELEASE_S = 1.2
@@ -44,15 +45,15 @@ def connect(port: PortSettings) -> EngineClient:
     return engine
 
 
-def until(engine: EngineClient, kind, patience_s=60.0, **fields):
+def until(engine: EngineClient, kind, **fields):
     """Events up to the first of a kind with these fields; that one is returned."""
-    deadline = time.monotonic() + patience_s
-    while time.monotonic() < deadline:
+    end_s = time.perf_counter() + PATIENCE_S
+    while time.perf_counter() < end_s:
         event = engine.wait(0.1)
         if isinstance(event, kind) and all(getattr(event, name) == value for name, value in fields.items()):
             return event
         assert not isinstance(event, Failed), event
-    raise AssertionError(f"no {kind.__name__} {fields} within {patience_s:g} s")
+    raise AssertionError(f"no {kind.__name__} {fields} within {PATIENCE_S:g} s")
 
 
 def index_of_first(run: Run, truth: Truth) -> int:
@@ -87,12 +88,9 @@ def record_run(
         return next(runs)
 
 
-def closed_run(folder: Path, patience_s: float = 20.0) -> Run:
+def closed_run(folder: Path) -> Run:
     """Wait for the one run of a folder to be complete."""
-    end = time.monotonic() + patience_s
-    while time.monotonic() < end:
-        files = sorted(path.suffix for path in folder.iterdir())
-        if files == [".h5"]:
-            return open_run(next(folder.glob("*.h5")))
-        time.sleep(0.05)
-    raise AssertionError(f"no complete run: {list(folder.iterdir())}")
+    wait_until(
+        lambda: [path.suffix for path in folder.iterdir()] == [".h5"], lambda: list(folder.iterdir()), 0.05
+    )
+    return open_run(next(folder.glob("*.h5")))

@@ -4,7 +4,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 from engine_kit import (
@@ -37,6 +36,7 @@ from app.runs.reader import open_run
 from app.runs.unattended import read_notes
 from app.simulated_stand.options import Gesture
 from tests.drills.processes import gone
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 
@@ -141,16 +141,9 @@ def test_a_killed_engine_is_noticed_and_its_journal_stays(tmp_path, shared):
         engine.send(Arm(run_in(tmp_path, duration_s=60.0)))
         started = until(engine, RunStarted)
         os.kill(engine.process_id, signal.SIGKILL)
-        for _ in range(200):
-            if any(isinstance(event, Failed) for event in engine.poll()):
-                break
-            time.sleep(0.05)
-        else:
-            pytest.fail("nobody noticed")
+        wait_until(lambda: any(isinstance(event, Failed) for event in engine.poll()))
     assert list(tmp_path.glob("*.journal"))
-    deadline = time.monotonic() + 20.0
-    while list(tmp_path.glob("*.recording")) and time.monotonic() < deadline:
-        time.sleep(0.05)
+    wait_until(lambda: not list(tmp_path.glob("*.recording")))
     run = open_run(started.path)
     assert run.end.ended == "interrupted"
     assert len(run) > 1000

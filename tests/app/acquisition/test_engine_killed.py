@@ -17,6 +17,7 @@ from app.runs.reader import load_counts, open_run
 from app.runs.unattended import read_notes
 from app.runs.validator import Validator
 from tests.drills.processes import children_of, descendants_of, gone
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks at processes as Linux lists them")
 
@@ -55,11 +56,7 @@ def test_a_killed_engine_is_noticed_at_once_and_leaves_no_process(tmp_path, shar
         children = descendants_of(engine.process_id)
         assert len(children) >= 1
         os.kill(engine.process_id, signal.SIGKILL)
-        killed_s = time.monotonic()
-        event = None
-        while not isinstance(event, Failed):
-            event = engine.wait(1.0)
-            assert time.monotonic() < killed_s + 10.0
+        event = wait_until(lambda: next((one for one in engine.poll() if isinstance(one, Failed)), None))
         assert f"slipstand recover {tmp_path}" in str(event.message)
         assert all(gone(child) for child in children)
     (recovered,) = recover_folder(tmp_path)
@@ -108,7 +105,7 @@ def test_a_killed_window_leaves_no_process_but_what_finishes_a_run(tmp_path, unt
         for module in (b"simulated_stand", b"acquisition.engine", b"runs.writer", b"runs.validator"):
             assert module in said
         owner.kill()
-    assert all(gone(process_id, patience_s=30.0) for process_id in running)
+    assert all(gone(process_id) for process_id in running)
     assert [open_run(path).end.ended for path in tmp_path.iterdir()] == [ended] * bool(ended)
     (note,) = read_notes(tmp_path).values()
     assert (note.ended, bool(note.path)) == (ended or "interrupted", bool(ended))

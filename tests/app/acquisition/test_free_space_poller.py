@@ -8,15 +8,9 @@ import pytest
 
 from app.acquisition import disk_space
 from app.acquisition.disk_space import DiskDemand, DiskSpaceMonitor
+from tests.waiting import PATIENCE_S, wait_until
 
 DEMAND = DiskDemand(1000.0, 9000.0)
-
-
-def wait_for(condition) -> None:
-    deadline = time.monotonic() + 10.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.005)
 
 
 @pytest.fixture
@@ -27,7 +21,7 @@ def disks(monkeypatch):
     def free_bytes(folder):
         free = known[folder]
         if isinstance(free, threading.Event):
-            free.wait(10.0)
+            free.wait(PATIENCE_S)
             return 30
         return free
 
@@ -42,14 +36,14 @@ def space(disks):
     yield made
     disks[Path("/hangs")].set()
     made.stop()
-    made._thread.join(5.0)
+    made._thread.join(PATIENCE_S)
     assert not made._thread.is_alive()
 
 
 def test_it_follows_what_is_free_and_one_folder_after_another(disks, space):
-    wait_for(lambda: space.free_bytes == 10)
+    wait_until(lambda: space.free_bytes == 10)
     disks[Path("/a")] = 11
-    wait_for(lambda: space.free_bytes == 11)
+    wait_until(lambda: space.free_bytes == 11)
     space.begin(Path("/b"), DEMAND)
     assert space.free_bytes == 20
     space.begin(Path("/gone"), DEMAND)
@@ -69,12 +63,12 @@ def test_a_disk_that_hangs_from_the_start_holds_nobody_up(disks):
     space = DiskSpaceMonitor(Path("/hangs"))
     assert space.free_bytes is None
     disks[Path("/hangs")].set()
-    wait_for(lambda: space.free_bytes == 30)
+    wait_until(lambda: space.free_bytes == 30)
     space.stop()
 
 
 def test_a_disk_that_begins_to_hang_holds_nobody_up(disks, space):
-    wait_for(lambda: space.free_bytes == 10)
+    wait_until(lambda: space.free_bytes == 10)
     disks[Path("/a")] = disks[Path("/hangs")]
     time.sleep(0.05)
     assert space.free_bytes == 10, "what was known last"

@@ -16,6 +16,7 @@ from app.runs.journal import RecordKind, read_journal
 from app.runs.lock import is_being_recorded
 from app.runs.metadata import create_metadata
 from config.files import load_gauges, load_stand
+from tests.waiting import PATIENCE_S, wait_until
 
 
 def header() -> JournalHeader:
@@ -75,12 +76,7 @@ def test_it_is_on_disk_while_the_journal_is_still_open(tmp_path):
     path = tmp_path / "run.journal"
     journal = create_journal(path, header())
     journal.append(b"now", 1)
-    for _ in range(100):
-        if [record.data for record in read_journal(path)][1:] == [b"now"]:
-            break
-        time.sleep(0.05)
-    else:
-        pytest.fail("not on disk within 5 s")
+    wait_until(lambda: [record.data for record in read_journal(path)][1:] == [b"now"])
     journal.close()
     journal.remove()
     journal.remove()
@@ -94,9 +90,7 @@ def test_each_record_is_handed_to_the_system_at_once(tmp_path, monkeypatch):
     journal = create_journal(path, header())
     for number in range(5):
         journal.append(b"%d" % number, number)
-        deadline = time.monotonic() + 5.0
-        while len(list(read_journal(path))) < number + 2 and time.monotonic() < deadline:
-            time.sleep(0.001)
+        wait_until(lambda count=number + 2: len(list(read_journal(path))) == count)
     assert [record.data for record in read_journal(path)][1:] == [b"0", b"1", b"2", b"3", b"4"]
     journal.close()
     journal.remove()
@@ -105,7 +99,7 @@ def test_each_record_is_handed_to_the_system_at_once(tmp_path, monkeypatch):
 def test_a_slow_disk_holds_no_record_up(tmp_path, monkeypatch):
     """While what came before is synced, what comes is handed to the system."""
     may_end = threading.Event()
-    monkeypatch.setattr("app.acquisition.journal.file.os.fsync", lambda _: may_end.wait(10.0))
+    monkeypatch.setattr("app.acquisition.journal.file.os.fsync", lambda _: may_end.wait(PATIENCE_S))
     monkeypatch.setattr(Journal, "_SYNC_S", 0.01)
     path = tmp_path / "run.journal"
     may_end.set()
@@ -114,10 +108,7 @@ def test_a_slow_disk_holds_no_record_up(tmp_path, monkeypatch):
     for number in range(20):
         journal.append(b"%d" % number, number)
         time.sleep(0.005)
-    deadline = time.monotonic() + 5.0
-    while len(list(read_journal(path))) < 21 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    assert len(list(read_journal(path))) == 21
+    wait_until(lambda: len(list(read_journal(path))) == 21)
     assert not may_end.is_set()
     may_end.set()
     journal.close()

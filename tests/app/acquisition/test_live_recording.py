@@ -1,9 +1,9 @@
 """The live identification beside a run of the real engine: its values arrive, its failure stops nothing."""
 
+import contextlib
 import os
 import signal
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -11,25 +11,23 @@ from engine_kit import FILES, connect, port_of, record_run, run_in, stand, until
 
 from app.acquisition.live_client import DIED_NOTE
 from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged
-from tests.drills.processes import gone
+from tests.drills.processes import children_of, gone
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
 
 
-def live_process_of(engine_pid, patience_s=20.0):
+def live_process_of(engine_pid):
     """Number of the process that an engine has for the live identification."""
-    deadline = time.monotonic() + patience_s
-    while time.monotonic() < deadline:
-        for folder in Path("/proc").glob("[0-9]*"):
-            try:
-                parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
-                command = (folder / "cmdline").read_bytes()
-            except OSError:
-                continue
-            if parent == engine_pid and b"app.acquisition.live_client" in command:
-                return int(folder.name)
-        time.sleep(0.05)
-    raise AssertionError("no live identification runs")
+
+    def found():
+        for process_id in children_of(engine_pid):
+            with contextlib.suppress(OSError):  # ended meanwhile
+                if b"app.acquisition.live_client" in Path(f"/proc/{process_id}/cmdline").read_bytes():
+                    return process_id
+        return None
+
+    return wait_until(found)
 
 
 def test_friction_is_told_while_the_motion_dies_away(tmp_path):

@@ -15,6 +15,7 @@ from drivers.devices.slipstand_binary.source import SlipstandBinarySource, make_
 from drivers.errors import DeviceLostError, PortUnavailableError
 from drivers.host_time import host_ns
 from drivers.port import PortInfo
+from tests.waiting import PATIENCE_S
 
 RATE_HZ = 1000.0
 N = 5
@@ -115,10 +116,10 @@ class Listener:
         self.chunks = []
         self.news = []
 
-    def listen(self, until, patience_s: float = 10.0) -> None:
-        deadline = time.monotonic() + patience_s
+    def listen(self, until) -> None:
+        end_s = time.perf_counter() + PATIENCE_S
         while not until():
-            assert time.monotonic() < deadline, self.news
+            assert time.perf_counter() < end_s, self.news
             chunk = self.stream.next_read(0.02)
             if chunk is not None:
                 self.chunks.append(chunk)
@@ -251,7 +252,7 @@ def test_a_wrong_rate_is_said_while_it_lasts():
     device = Device(true_rate_hz=1050.0)
     listener = Listener(device)
     with listener.stream:
-        listener.listen(lambda: listener.heard(StreamNotice), 60.0)
+        listener.listen(lambda: listener.heard(StreamNotice))
         listener.listen_for(0.5)
     (noticed,) = [news for news in listener.news if isinstance(news, StreamNotice)]
     assert "instead of 1000: check its rate" in str(noticed.message)
@@ -261,9 +262,7 @@ def test_a_wrong_rate_is_said_while_it_lasts():
 def test_a_stream_that_is_closed_while_its_device_is_away_leaves_nothing(device, listener):
     device.unplug()
     listener.listen(lambda: listener.heard(Reconnecting))
-    begin = time.monotonic()
     listener.stream.close()
-    assert time.monotonic() - begin < 5.0
     device.plug_in()
     opened = device.opened
     time.sleep(0.1)

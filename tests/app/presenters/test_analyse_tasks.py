@@ -2,7 +2,6 @@
 
 import multiprocessing
 import shutil
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from app.presenters.worker import Worker
 from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from tests.drills.processes import descendants_of, gone
+from tests.waiting import wait_until
 
 
 @pytest.fixture
@@ -72,11 +72,13 @@ def test_giving_up_many_keeps_what_is_done_and_leaves_no_process(
     said: list[Any] = []
     worker.submit(analyse_runs, paths, False, progress=said.append)
     done: list[RunAnalysed] = []
-    deadline = time.monotonic() + 120.0
-    while not done and time.monotonic() < deadline:
+
+    def has_come() -> bool:
         worker.poll()
-        done = [progress for progress in said if isinstance(progress, RunAnalysed)]
-        time.sleep(0.01)
+        done.extend(progress for progress in said if isinstance(progress, RunAnalysed))
+        return bool(done)
+
+    wait_until(has_come)
     (child,) = multiprocessing.active_children()
     running = [child.pid, *descendants_of(child.pid or 0)]
     worker.cancel()

@@ -1,8 +1,7 @@
 """One connection at a time, opened in the background, and nothing left running."""
 
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import pytest
 from stage import FakeEngine, FakeLauncher, FakeSimulation, ended
@@ -26,6 +25,7 @@ from app.presenters.error_reports import ErrorReporter
 from app.simulated_stand.options import Gesture, SimulatedStandOptions
 from config.files import published_row
 from drivers.errors import PortUnavailableError
+from tests.waiting import PATIENCE_S, wait_until
 
 PORT = PortSettings("COM7", "csv")
 
@@ -51,18 +51,13 @@ def session(launcher: FakeLauncher, faults: ErrorReporter) -> Iterator[Connectio
 def poll_until(session: Connection, kind: type) -> list[Event | SimulationStarted]:
     """Events until one of a kind has come."""
     events: list[Event | SimulationStarted] = []
-    deadline = time.monotonic() + 5.0
-    while not any(isinstance(event, kind) for event in events):
-        assert time.monotonic() < deadline, events
-        events += session.poll()
+
+    def has_come() -> bool:
+        events.extend(session.poll())
+        return any(isinstance(event, kind) for event in events)
+
+    wait_until(has_come, lambda: events)
     return events
-
-
-def wait_for(condition: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + 5.0
-    while not condition():
-        assert time.monotonic() < deadline
-        time.sleep(0.002)
 
 
 def test_a_stand_that_has_ended_is_not_offered(session: Connection, launcher: FakeLauncher) -> None:
@@ -73,7 +68,7 @@ def test_a_stand_that_has_ended_is_not_offered(session: Connection, launcher: Fa
     stand.is_running = False
     assert session.stand is None
     session.disconnect()
-    wait_for(lambda: stand.stopped)
+    wait_until(lambda: stand.stopped)
 
 
 def test_nothing_happens_before_something_is_opened(session: Connection) -> None:
@@ -101,7 +96,7 @@ def test_the_simulated_stand_is_started_first_and_ended_last(
     events = poll_until(session, Connected)
     assert events[0] == SimulationStarted("2SSM1", published_row("2SSM1").friction_dynamic)
     session.disconnect()
-    wait_for(lambda: launcher.simulations[0].stopped)
+    wait_until(lambda: launcher.simulations[0].stopped)
     assert launcher.engines[0].closed
 
 
@@ -130,7 +125,7 @@ def test_an_engine_that_fails_is_let_go(session: Connection, launcher: FakeLaunc
     launcher.engines[0].say(Failed("COM7 is gone. Plug it in again"))
     poll_until(session, Failed)
     assert not session.is_active
-    wait_for(lambda: launcher.simulations[0].stopped and launcher.engines[0].closed)
+    wait_until(lambda: launcher.simulations[0].stopped and launcher.engines[0].closed)
 
 
 def test_opening_anew_ends_the_old_connection_first(session: Connection, launcher: FakeLauncher) -> None:
@@ -148,7 +143,7 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
 
         def simulation(self, options: SimulatedStandOptions) -> FakeSimulation:
             self.started.set()
-            self.go_on.wait(5.0)
+            self.go_on.wait(PATIENCE_S)
             return super().simulation(options)
 
         def engine(self, port: PortSettings) -> FakeEngine:
@@ -157,7 +152,7 @@ def test_closing_waits_for_what_is_still_being_opened() -> None:
     launcher = SlowLauncher()
     session = Connection(*launcher.starters, ErrorReporter().report)
     session.open_simulated(SimulatedStandOptions(series="1FFM0"))
-    launcher.started.wait(5.0)
+    launcher.started.wait(PATIENCE_S)
     threading.Timer(0.05, launcher.go_on.set).start()
     session.close()
     assert launcher.engines[0].closed
@@ -237,7 +232,7 @@ def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: ErrorRe
 
         def engine(self, port: PortSettings) -> FakeEngine:
             made = super().engine(port)
-            made.close = lambda: self.go_on.wait(10.0)  # type: ignore[method-assign]
+            made.close = lambda: self.go_on.wait(PATIENCE_S)  # type: ignore[method-assign]
             return made
 
     session = Connection(*Hangs().starters, faults.report)
@@ -252,7 +247,7 @@ def test_an_engine_that_never_ends_keeps_nobody_waiting_for_ever(faults: ErrorRe
     ]
     assert thread.daemon, "it would keep the program from ending"
     Hangs.go_on.set()
-    thread.join(5.0)
+    thread.join(PATIENCE_S)
 
 
 def test_the_simulated_stand_pulls_once_for_each_run(session: Connection, launcher: FakeLauncher) -> None:

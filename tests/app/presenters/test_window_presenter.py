@@ -1,7 +1,6 @@
 """The window presenter from the start page to the result, with fake engine and workers."""
 
 import datetime
-import time
 from collections.abc import Iterator
 
 import msgspec
@@ -41,6 +40,7 @@ from app.presenters.start_screen import StartState
 from app.presenters.window import WindowContext, WindowPresenter
 from config.files import load_gauges
 from config.schema import ConfigError, RecentDevice, RecentUse, Settings
+from tests.waiting import wait_until
 
 NOON = datetime.datetime(2026, 2, 1, 12, tzinfo=datetime.UTC)
 
@@ -66,10 +66,7 @@ class Desk:
         )
 
     def tick_until_connected(self) -> None:
-        deadline = time.monotonic() + 5.0
-        while not self.window.start.state.connected:
-            assert time.monotonic() < deadline
-            self.window.tick()
+        wait_until(lambda: self.window.tick() or self.window.start.state.connected)
 
     def analysis(self, path: str = RUN) -> Call:
         """The only analysis that was submitted."""

@@ -22,6 +22,7 @@ from app.runs.batch.executors import ProcessExecutor
 from config.schema import ConfigError
 from messages.message import message
 from tests.drills.processes import gone, is_alive
+from tests.waiting import PATIENCE_S, wait_until
 
 
 def halve(number: int, report: ReportProgress) -> float:
@@ -65,11 +66,12 @@ class Answers:
 
     def wait(self, *, ended: int = 0, progress: int = 0) -> None:
         """Poll until as many tasks have ended, and as much progress was reported, as wanted."""
-        deadline = time.monotonic() + 20.0
-        while len(self.done) + len(self.failed) < ended or len(self.progress) < progress:
-            assert time.monotonic() < deadline, self.all
+
+        def has_come() -> bool:
             self.worker.poll()
-            time.sleep(0.005)
+            return len(self.done) + len(self.failed) >= ended and len(self.progress) >= progress
+
+        wait_until(has_come, lambda: self.all)
 
     def _adding_to(self, answers: list[Any]) -> Callable[[Any], None]:
         def add(answer: Any) -> None:
@@ -261,7 +263,7 @@ def test_nothing_is_left_of_an_owner_that_was_killed_or_forgot_to_close(tmp_path
         if end == "stay":
             assert all(is_alive(number) for number in running)
             owner.kill()
-        owner.wait(20.0)
+        owner.wait(PATIENCE_S)
     assert all(gone(number) for number in running)
 
 

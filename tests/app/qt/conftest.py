@@ -18,11 +18,12 @@ from window_desk import Desk
 
 from app.qt.theme import Theme
 from config.schema import RecentUse
+from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture(autouse=True)
 def nothing_left_behind(qapp: QApplication) -> Iterator[None]:
-    """Fail when widgets, threads or child processes outlive the test by two seconds."""
+    """Fail when widgets, threads or child processes outlive the test."""
     threads, children = set(threading.enumerate()), child_processes()
     widgets = set(map(id, QApplication.topLevelWidgets()))
     yield
@@ -38,9 +39,9 @@ def theme(qapp: QApplication) -> Theme:
 
 
 def gone(left: Callable[[], list[object]], what: str) -> None:
-    deadline = time.monotonic() + 2.0
+    end_s = time.perf_counter() + PATIENCE_S
     while found := left():
-        if time.monotonic() > deadline:
+        if time.perf_counter() > end_s:
             pytest.fail(f"{what} left behind: {found}")
         gc.collect()
         QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

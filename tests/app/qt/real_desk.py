@@ -16,9 +16,10 @@ from typing import Any
 
 import pytest
 
+from tests.waiting import PATIENCE_S
+
 NEEDED = ("Xvfb", "openbox", "xdotool", "xclip")
 SIZE = "1400x900x24"
-PATIENCE_S = 90.0
 Place = tuple[int, int, int, int]
 Shown = dict[str, Any]
 _PROGRAM = Path(__file__).with_name("observed_program.py")
@@ -188,7 +189,9 @@ class Desk:
     def clipboard(self, target: str = "UTF8_STRING") -> bytes:
         """What a program that pastes receives."""
         command = ["xclip", "-selection", "clipboard", "-out", "-target", target]
-        done = subprocess.run(command, env=self.environment, capture_output=True, timeout=20, check=False)
+        done = subprocess.run(
+            command, env=self.environment, capture_output=True, timeout=PATIENCE_S, check=False
+        )
         return done.stdout
 
     def title(self) -> str:
@@ -201,7 +204,7 @@ class Desk:
             env=self.environment,
             capture_output=True,
             text=True,
-            timeout=20,
+            timeout=PATIENCE_S,
             check=False,
         )
         return done.stdout

@@ -21,10 +21,10 @@ from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.runs.reader import open_run
 from config.files import load_stand
+from tests.waiting import PATIENCE_MS
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the simulated stand uses a pseudo-terminal")
 
-PATIENCE_MS = 90_000
 NONE, CONTROL, ALT = (
     Qt.KeyboardModifier.NoModifier,
     Qt.KeyboardModifier.ControlModifier,

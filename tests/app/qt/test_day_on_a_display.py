@@ -11,6 +11,7 @@ import pytest
 from real_desk import Desk, middle_of, missing_programs, program, running, window_system
 
 from app.runs.reader import open_run
+from tests.waiting import PATIENCE_S
 
 pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="Xvfb is a window system of Linux"),
@@ -317,7 +318,7 @@ def close_while_recording(desk: Desk, home: Path) -> None:
     desk.wait_until_gone("Closing the window")
     desk.press("alt+F4")
     desk.click("Close the window")
-    assert desk.process.wait(30.0) == 0
+    assert desk.process.wait(PATIENCE_S) == 0
     assert len(runs_of(home)) == before + 1
 
 
@@ -328,4 +329,4 @@ def begin_again(desk: Desk, first: Path) -> None:
     desk.click(f"Open {first.stem}")
     desk.wait(lambda: desk.title().startswith(f"{first.stem} "), "the run in the title")
     desk.press("ctrl+q")
-    assert desk.process.wait(30.0) == 0
+    assert desk.process.wait(PATIENCE_S) == 0

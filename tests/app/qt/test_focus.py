@@ -15,6 +15,7 @@ from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.screens import Screen
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack
+from tests.waiting import PATIENCE_MS
 
 
 def reached_by_tab(window: QWidget) -> list[QWidget]:
@@ -102,7 +103,7 @@ def test_the_start_page_with_all_settings_unfolded(desk: Desk) -> None:
 def test_a_recording_that_is_open(desk: Desk) -> None:
     desk.presenter.open_run(RUN)
     desk.worker.calls[-1].done(analysed())
-    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=PATIENCE_MS)
     check(desk.window)
 
 
@@ -110,7 +111,7 @@ def test_a_recording_that_is_open(desk: Desk) -> None:
 def test_each_tab_of_identify_with_cursors_too(desk: Desk, side: IdentifySide) -> None:
     desk.presenter.open_run(RUN)
     desk.worker.calls[-1].done(with_scan())
-    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=PATIENCE_MS)
     desk.presenter.identify.toggle_cursors()
     desk.presenter.identify.set_tab(side)
     check(desk.window)
@@ -119,7 +120,7 @@ def test_each_tab_of_identify_with_cursors_too(desk: Desk, side: IdentifySide) -
 def test_plots_that_take_keys_show_the_focus(desk: Desk, theme: Theme) -> None:
     desk.presenter.open_run(RUN)
     desk.worker.calls[-1].done(with_scan())
-    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=PATIENCE_MS)
     desk.window.activateWindow()
     for plots in filter(QWidget.isVisible, desk.window.findChildren(PlotStack)):
         desk.button("Cursors").setFocus()

@@ -13,6 +13,7 @@ from app.presenters.gauges.state import PortCard
 from app.presenters.navigator import ConnectForm
 from app.presenters.record.state import Action, MoveToTrash
 from app.presenters.screens import Screen
+from tests.waiting import PATIENCE_MS
 
 
 def focused() -> QWidget:
@@ -28,12 +29,12 @@ def press(desk: Desk, key: Qt.Key) -> None:
 def record(desk: Desk) -> None:
     """Connect the simulated stand, and record a run up to its result."""
     desk.click("Try with the simulated stand")
-    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=PATIENCE_MS)
     press(desk, Qt.Key.Key_A)
     desk.launcher.engines[0].play(END_S + 0.1)
-    desk.qtbot.waitUntil(lambda: bool(desk.worker.calls), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.worker.calls), timeout=PATIENCE_MS)
     desk.worker.calls[-1].done(analysed())
-    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.decision is not None, timeout=5000)
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.decision is not None, timeout=PATIENCE_MS)
 
 
 @pytest.mark.parametrize("key", [Qt.Key.Key_Return, Qt.Key.Key_Enter])
@@ -91,11 +92,11 @@ def test_the_focus_does_not_pass_on_from_a_button_that_is_disabled_or_hidden(des
 
 def test_neither_arm_nor_stop_has_the_focus_while_a_run_is_recorded(desk: Desk) -> None:
     desk.click("Try with the simulated stand")
-    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=PATIENCE_MS)
     desk.button("Arm   A").setFocus()
     press(desk, Qt.Key.Key_Return)
     desk.launcher.engines[0].play(3.0)
-    desk.qtbot.waitUntil(lambda: desk.presenter.record.is_recording, timeout=5000)
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.is_recording, timeout=PATIENCE_MS)
     assert focused() is desk.window.home()
     press(desk, Qt.Key.Key_Space)
     press(desk, Qt.Key.Key_Return)
@@ -134,7 +135,7 @@ def test_no_part_of_a_screen_is_a_window_for_a_moment_which_would_take_the_focus
 
 def test_enter_arms_where_arming_comes_next_and_a_key_held_down_does_not(desk: Desk) -> None:
     desk.click("Try with the simulated stand")
-    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.primary is Action.ARM, timeout=5000)
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.primary is Action.ARM, timeout=PATIENCE_MS)
     held = QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Return, Qt.KeyboardModifier.NoModifier, "", True)
     QApplication.sendEvent(focused(), held)
     assert Action.ARM in desk.presenter.record.state.allowed

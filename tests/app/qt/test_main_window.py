@@ -29,6 +29,7 @@ from app.presenters.screens import Screen
 from app.qt.theme import DARK, LIGHT, Theme
 from app.qt.widgets.shortcuts import HelpDialog
 from config.schema import WindowLayout
+from tests.waiting import PATIENCE_MS
 
 
 def test_what_the_first_paint_needs_loads_nothing_heavy() -> None:
@@ -41,10 +42,10 @@ def test_what_the_first_paint_needs_loads_nothing_heavy() -> None:
 
 def test_the_simulated_stand_is_one_click_away(desk: Desk) -> None:
     desk.click("Try with the simulated stand")
-    desk.qtbot.waitUntil(lambda: "Slipstand simulator" in desk.words(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: "Slipstand simulator" in desk.words(), timeout=PATIENCE_MS)
     assert desk.presenter.state.screen is Screen.RECORD
     desk.launcher.engines[0].play(1.0)
-    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.readings.table == "0.20", timeout=5000)
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.state.readings.table == "0.20", timeout=PATIENCE_MS)
 
 
 def test_an_amplifier_is_connected_as_filled_in(desk: Desk) -> None:
@@ -61,7 +62,7 @@ def test_an_amplifier_is_connected_as_filled_in(desk: Desk) -> None:
     desk.field("Baud").clear()
     desk.qtbot.keyClicks(desk.field("Baud"), "9600")
     desk.click("Connect my amplifier")
-    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=PATIENCE_MS)
     assert desk.launcher.ports == [
         PortSettings("socket://127.0.0.1:7", "csv", baud=9600, parity="N", stop_bits=1)
     ]
@@ -77,9 +78,9 @@ def test_ports_are_offered_and_the_usual_baud_is_shown(desk: Desk) -> None:
 
 def test_an_error_stands_above_the_screen_until_dismissed(desk: Desk) -> None:
     desk.presenter.open_port(PortSettings("COM7", "csv"))
-    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=PATIENCE_MS)
     desk.launcher.engines[0].say(Failed("COM7 is gone. Plug it in again"))
-    desk.qtbot.waitUntil(lambda: "COM7 is gone. Plug it in again" in desk.words(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: "COM7 is gone. Plug it in again" in desk.words(), timeout=PATIENCE_MS)
     assert clipped_words(desk.window) == []
     assert QApplication.activeModalWidget() is None
     desk.click("Dismiss")
@@ -118,13 +119,13 @@ def test_a_recording_is_chosen_in_a_dialog_that_blocks_nothing(desk: Desk) -> No
     dialog.fileSelected.emit(RUN)
     dialog.close()
     desk.worker.calls[-1].done(analysed())
-    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: "Friction laws" in desk.words(), timeout=PATIENCE_MS)
     assert desk.presenter.state.screen is Screen.IDENTIFY
 
 
 def test_closing_ends_engine_stand_and_worker(desk: Desk) -> None:
     desk.click("Try with the simulated stand")
-    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=PATIENCE_MS)
     desk.window.close()
     assert desk.launcher.engines[0].closed
     assert desk.launcher.simulations[0].stopped
@@ -160,7 +161,7 @@ def test_what_a_port_suggests_is_filled_in(desk: Desk) -> None:
 
 def test_a_fault_of_the_program_is_shown_with_its_details_folded(desk: Desk) -> None:
     desk.faults.report(ErrorReport("Slipstand itself failed", "Traceback\n  in nowhere"))
-    desk.qtbot.waitUntil(lambda: "Slipstand itself failed" in desk.words(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: "Slipstand itself failed" in desk.words(), timeout=PATIENCE_MS)
     (details,) = [f for f in desk.window.findChildren(QPlainTextEdit) if f.accessibleName() == "Details"]
     assert not details.isVisible()
     assert clipped_words(desk.window) == []
@@ -184,7 +185,7 @@ def test_an_exception_in_a_slot_is_said_and_the_window_goes_on(
         desk.faults.install_hooks()
         desk.button("More settings").clicked.connect(lambda: {}["nothing"])
         desk.click("More settings")
-        desk.qtbot.waitUntil(lambda: "KeyError: 'nothing'" in desk.words(), timeout=5000)
+        desk.qtbot.waitUntil(lambda: "KeyError: 'nothing'" in desk.words(), timeout=PATIENCE_MS)
     desk.press_number_of(Screen.STAND)
     assert desk.presenter.state.screen is Screen.STAND
 
@@ -260,10 +261,10 @@ def test_the_window_speaks_russian(
 
 def test_closing_the_window_in_a_recording_asks_and_the_safe_answer_has_the_focus(desk: Desk) -> None:
     desk.click("Try with the simulated stand")
-    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=PATIENCE_MS)
     desk.presenter.record.dispatch(Action.ARM)
     desk.launcher.engines[0].play(6.0)
-    desk.qtbot.waitUntil(lambda: desk.presenter.record.is_recording, timeout=5000)
+    desk.qtbot.waitUntil(lambda: desk.presenter.record.is_recording, timeout=PATIENCE_MS)
     desk.window.activateWindow()
     before = QApplication.focusWidget()
     desk.window.close()
@@ -276,13 +277,13 @@ def test_closing_the_window_in_a_recording_asks_and_the_safe_answer_has_the_focu
     assert desk.window.isVisible()
     desk.window.close()
     desk.click("Close the window")
-    desk.qtbot.waitUntil(lambda: not desk.window.isVisible(), timeout=5000)
+    desk.qtbot.waitUntil(lambda: not desk.window.isVisible(), timeout=PATIENCE_MS)
     assert desk.launcher.engines[0].closed
 
 
 def test_no_key_on_start_lets_the_simulator_take_the_place_of_an_amplifier(desk: Desk) -> None:
     desk.presenter.open_port(PortSettings("COM7", "csv"))
-    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=PATIENCE_MS)
     desk.presenter.show_screen(Screen.START)
     desk.window.activateWindow()
     assert not desk.button("Try with the simulated stand").hasFocus()

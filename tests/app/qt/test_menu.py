@@ -12,6 +12,7 @@ from window_desk import Desk
 from app.log import FOLDER_VARIABLE
 from app.qt.menu import AboutDialog
 from app.version import version_text
+from tests.waiting import PATIENCE_MS
 
 
 def action(desk: Desk, text: str) -> QAction:
@@ -41,7 +42,7 @@ def test_the_menu_opens_by_key_and_its_entries_are_chosen_by_arrows(desk: Desk) 
 
     desk.window._menu.menu().aboutToShow.connect(lambda: desk.window._timer.singleShot(0, choose))
     desk.qtbot.keyClick(desk.window, Qt.Key.Key_F10)
-    desk.qtbot.waitUntil(lambda: bool(texts), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(texts), timeout=PATIENCE_MS)
     assert texts[:2] == ["Keys", "Quit"]
 
 
@@ -76,7 +77,8 @@ def test_the_title_names_device_and_state(desk: Desk) -> None:
     assert desk.window.windowTitle() == "Slipstand"
     desk.click("Try with the simulated stand")
     desk.qtbot.waitUntil(
-        lambda: desk.window.windowTitle() == "Slipstand simulator \u2013 ready \u2013 Slipstand", timeout=5000
+        lambda: desk.window.windowTitle() == "Slipstand simulator \u2013 ready \u2013 Slipstand",
+        timeout=PATIENCE_MS,
     )
 
 

@@ -15,6 +15,7 @@ from app.presenters.screens import Screen
 from app.qt.stand_settings_dialog import StandSettingsDialog
 from app.qt.theme import Theme
 from config.files import load_stand
+from tests.waiting import PATIENCE_MS
 
 
 class Stage:
@@ -106,7 +107,7 @@ def test_a_pullback_is_added_and_another_removed_by_keys(stage: Stage) -> None:
 def test_a_connected_device_is_to_be_connected_again(stage: Stage) -> None:
     window = stage.desk.presenter
     window.start.start_simulation()
-    stage.qtbot.waitUntil(lambda: bool(window.start.state.connected), timeout=5000)
+    stage.qtbot.waitUntil(lambda: bool(window.start.state.connected), timeout=PATIENCE_MS)
     stage.type(stage.field("Name"), "Stand 2")
     stage.qtbot.keyClick(stage.dialog, Qt.Key.Key_S, Qt.KeyboardModifier.ControlModifier)
     assert window.state.notice is not None

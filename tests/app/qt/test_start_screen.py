@@ -16,6 +16,7 @@ from app.presenters.screens import Screen
 from app.qt.find_dialog import FindDialog
 from app.qt.theme import Theme
 from config.schema import RecentDevice, RecentUse
+from tests.waiting import PATIENCE_MS
 
 LAST = RecentDevice("ME GSV-8 S/N 12345678", "/dev/serial/by-id/usb-FTDI_FT232R_A9001-if00", "csv")
 RUNS = tuple(f"/recordings/20260112T1015{number:02d}_1FFM0_{number:03d}.h5" for number in range(6))
@@ -29,7 +30,7 @@ def recent(request: pytest.FixtureRequest) -> RecentUse | None:
 def test_the_last_amplifier_is_connected_with_one_key(desk: Desk) -> None:
     assert f"{LAST.name} on {LAST.port}" in desk.words().replace("\u200b", "")
     desk.qtbot.keyClick(desk.window, Qt.Key.Key_A, Qt.KeyboardModifier.AltModifier)
-    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=PATIENCE_MS)
     assert desk.launcher.ports == [PortSettings(LAST.port, "csv", parity="N", stop_bits=1)]
 
 
@@ -84,7 +85,7 @@ def test_an_amplifier_that_is_found_is_connected_by_enter(desk: Desk) -> None:
     desk.qtbot.keyClick(connect, Qt.Key.Key_Return)
     assert not dialog.isVisible()
     assert desk.presenter.state.screen is Screen.RECORD
-    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=PATIENCE_MS)
     assert desk.launcher.ports == [PortSettings("COM7", "gsv", 115200, "N", 1)]
 
 
@@ -120,7 +121,7 @@ def test_enter_connects_as_the_coloured_button_says(desk: Desk, key: Qt.Key) -> 
     assert desk.button("Connect again").property("primary") == "true"
     assert desk.button("Try with the simulated stand").property("primary") == "false"
     desk.qtbot.keyClick(desk.window, key)
-    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=PATIENCE_MS)
     desk.presenter.show_screen(Screen.START)
     assert desk.button("Connect again").property("primary") == "false"
     desk.qtbot.keyClick(desk.window, key)
@@ -132,7 +133,7 @@ def test_enter_at_the_first_start_tries_the_simulated_stand(desk: Desk) -> None:
     desk.qtbot.waitUntil(desk.window.isActiveWindow)
     assert desk.button("Try with the simulated stand").property("primary") == "true"
     desk.qtbot.keyClick(desk.window, Qt.Key.Key_Return)
-    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.presenter.start.state.connected), timeout=PATIENCE_MS)
     assert len(desk.launcher.simulations) == 1
 
 
@@ -140,6 +141,6 @@ def test_enter_in_a_field_connects_what_is_filled_in(desk: Desk) -> None:
     desk.field("Baud").setFocus()
     desk.qtbot.keyClicks(desk.field("Baud"), "9600")
     desk.qtbot.keyClick(desk.field("Baud"), Qt.Key.Key_Return)
-    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=5000)
+    desk.qtbot.waitUntil(lambda: bool(desk.launcher.ports), timeout=PATIENCE_MS)
     assert [port.baud for port in desk.launcher.ports] == [9600]
     assert desk.launcher.simulations == []

@@ -23,13 +23,13 @@ from app.qt.theme import Theme
 from app.qt.window import MainWindow
 from app.runs.reader import open_run
 from app.simulated_stand.options import SimulatedStandOptions
+from tests.waiting import PATIENCE_MS
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="the simulated stand uses a pseudo-terminal")
 
 QUICK = SimulatedStandOptions(
     series="3FFM0", rest_s=0.8, pull_s=0.4, hold_s=0.4, decay_s=6.0, recentre_s=0.2, seed=1, rate_hz=1000.0
 )
-PATIENCE_MS = 60_000
 
 
 @pytest.fixture

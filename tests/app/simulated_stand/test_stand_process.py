@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import msgspec
 import numpy as np
@@ -23,6 +22,7 @@ from drivers.devices.slipstand_binary.codec import FrameDecoder
 from drivers.errors import DeviceLostError, PortUnavailableError, SettingsError
 from drivers.port import Port, open_port
 from drivers.samples import SampleBlock
+from tests.drills.processes import gone, is_alive
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 
@@ -45,23 +45,6 @@ def listen(port: str, duration_s: float, rate_hz: float) -> tuple[np.ndarray, Fr
     finally:
         os.close(descriptor)
     return np.concatenate([block.counts for block in blocks]), decoder
-
-
-def alive(process_id: int) -> bool:
-    """Tell whether a process runs; one that waits to be collected does not."""
-    try:
-        os.kill(process_id, 0)
-    except ProcessLookupError:
-        return False
-    state = Path(f"/proc/{process_id}/stat")
-    return not (state.exists() and state.read_text().rpartition(")")[2].split()[0] == "Z")
-
-
-def gone(process_id: int, patience_s: float = 10.0) -> bool:
-    end = time.monotonic() + patience_s
-    while alive(process_id) and time.monotonic() < end:
-        time.sleep(0.02)
-    return not alive(process_id)
 
 
 def test_what_it_sends_is_its_truth_to_the_sample():
@@ -227,6 +210,6 @@ def test_it_ends_when_its_owner_is_killed():
     )
     with owner:
         process_id = int(owner.stdout.readline())
-        assert alive(process_id)
+        assert is_alive(process_id)
         owner.send_signal(signal.SIGKILL)
     assert gone(process_id)

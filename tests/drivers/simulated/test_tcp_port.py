@@ -8,6 +8,7 @@ import pytest
 from drivers.errors import PortUnavailableError
 from drivers.port import open_port
 from drivers.simulated.transport import open_tcp_port
+from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture
@@ -23,13 +24,13 @@ def address(port) -> tuple[str, int]:
 
 
 def connect(port) -> socket.socket:
-    return socket.create_connection(address(port), timeout=5.0)
+    return socket.create_connection(address(port), timeout=PATIENCE_S)
 
 
-def until(port, expected, patience_s=5.0):
+def until(port, expected):
     """Receive until something else than before comes."""
-    end = time.monotonic() + patience_s
-    while (received := port.receive()) != expected and time.monotonic() < end:
+    end = time.perf_counter() + PATIENCE_S
+    while (received := port.receive()) != expected and time.perf_counter() < end:
         port.wait(0.01)
     assert received == expected
 

@@ -1,7 +1,6 @@
 """Many tasks in worker processes: order, bounds, failures, dead workers, interruption."""
 
 import os
-import time
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
@@ -19,6 +18,7 @@ from app.runs.batch.executors import (
     ordered_map,
 )
 from app.runs.batch.tasks import AnalysisTask, analyze_runs
+from tests.waiting import wait_until
 
 
 class Unhurried(Executor):
@@ -114,9 +114,7 @@ def test_a_process_that_dies_costs_one_run_at_most(processes, tmp_path):
 def test_work_is_given_up_at_once_and_leaves_nothing(tmp_path):
     crew = ProcessExecutor(2, nothing)
     futures = [crew.submit(waiting, str(tmp_path)) for _ in range(2)]
-    deadline = time.monotonic() + 30.0
-    while len(list(tmp_path.glob("*.half"))) < 2 and time.monotonic() < deadline:
-        time.sleep(0.02)
+    wait_until(lambda: len(list(tmp_path.glob("*.half"))) == 2)
     running = [int(path.stem) for path in tmp_path.glob("*.half")]
     assert len(running) == 2
     crew.close(now=True)
@@ -133,8 +131,7 @@ def test_work_that_waits_in_the_queue_is_not_begun_once_it_is_given_up(tmp_path)
     crew = ProcessExecutor(1, nothing)
     for _ in range(4):
         crew.submit(waiting_apart, str(tmp_path))
-    while not list(tmp_path.glob("*.half")):
-        time.sleep(0.02)
+    wait_until(lambda: list(tmp_path.glob("*.half")))
     crew.close(now=True)
     assert [path.suffix for path in tmp_path.iterdir()] == [".begun"]
 
@@ -146,8 +143,7 @@ def test_a_change_of_a_run_that_hangs_leaves_nothing_when_it_is_given_up(tmp_pat
     crew = ProcessExecutor(1, nothing)
     begun = tmp_path / "begun"
     crew.submit(partial(rewriting_for_ever, change_begins=str(begun)), str(run))
-    while not begun.exists():
-        time.sleep(0.02)
+    wait_until(begun.exists)
     assert len(list(tmp_path.iterdir())) == 4, "the copy and its lock"
     crew.close(now=True)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["begun", "run.h5"]

@@ -21,6 +21,7 @@ from drivers.port import open_port, port_info
 from drivers.samples import SampleBlock, SampleStatus
 from drivers.simulated.device import DeviceSetup
 from drivers.simulated.transport import Transport, open_pseudo_terminal, open_tcp_port
+from tests.waiting import PATIENCE_S
 
 ORDERS = {"ABCD": "BIG", "CDAB": "LITTLE_SWAP", "BADC": "BIG_SWAP", "DCBA": "LITTLE"}
 """The orders as minimalmodbus names them."""
@@ -81,7 +82,7 @@ def pymodbus_server(values: dict[int, list[int]], first: int = 0, framing: str =
     ended = asyncio.Event()
     thread = threading.Thread(target=lambda: loop.run_until_complete(serve()))
     thread.start()
-    assert is_ready.wait(10)
+    assert is_ready.wait(PATIENCE_S)
     try:
         yield f"socket://127.0.0.1:{number}"
     finally:
@@ -98,10 +99,10 @@ def registers(layout: str, *values: float) -> list[int]:
 def read_some(url: str, settings: dict[str, str], samples: int = 5):
     source = make_source(settings, 50.0)
     blocks: list[SampleBlock] = []
-    deadline_s = time.monotonic() + 20.0
+    end_s = time.perf_counter() + PATIENCE_S
     with open_port(url, 115200) as port:
         source.start(port)
-        while source.losses.samples < samples and time.monotonic() < deadline_s:
+        while source.losses.samples < samples and time.perf_counter() < end_s:
             blocks += source.decode(data, 0) if (data := source.read(port)) else []
     return join(blocks), source
 
