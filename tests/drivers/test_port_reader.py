@@ -96,7 +96,8 @@ def test_a_computer_that_wakes_late_lets_less_gather(monkeypatch):
     assert gathering._longest_delay_s() == pytest.approx(0.02, rel=0.1), "and as much as before after a while"
 
 
-def test_a_port_that_holds_more_lets_more_gather():
+def test_a_port_that_holds_more_lets_more_gather(monkeypatch):
+    monkeypatch.setattr("drivers.stream.time", WindowsClock())
     gathering, wire = BatchedReader(), Wire(*[b"ab"] * 10)
     gathering.read(wire, 0.001, CollectLimit(8192, 4096))
     gathering._bytes_per_s = 100_000.0

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from engine_kit import (
@@ -32,6 +33,7 @@ from app.acquisition.messages import (
     StateChanged,
     Stop,
 )
+from app.runs.lock import is_being_recorded
 from app.runs.reader import open_run
 from app.runs.unattended import read_notes
 from app.simulated_stand.options import Gesture
@@ -143,7 +145,7 @@ def test_a_killed_engine_is_noticed_and_its_journal_stays(tmp_path, shared):
         os.kill(engine.process_id, signal.SIGKILL)
         wait_until(lambda: any(isinstance(event, Failed) for event in engine.poll()))
     assert list(tmp_path.glob("*.journal"))
-    wait_until(lambda: not list(tmp_path.glob("*.recording")))
+    wait_until(lambda: not is_being_recorded(Path(started.path)))
     run = open_run(started.path)
     assert run.end.ended == "interrupted"
     assert len(run) > 1000
@@ -166,16 +168,17 @@ while True:
 
 
 @pytest.mark.parametrize(("word", "ended"), [("RunStarted", "duration"), ("held", "interrupted")])
-def test_when_its_owner_is_killed_the_run_is_finished_and_stored(tmp_path, shared, word, ended):
-    owner = subprocess.Popen(
-        [sys.executable, "-c", OWNER, shared.port, str(tmp_path), *FILES, word],
-        stdout=subprocess.PIPE,
-    )
-    with owner:
-        engine_id = int(owner.stdout.readline())
-        assert owner.stdout.readline().split() == [word.encode()]
-        owner.send_signal(signal.SIGKILL)
-    run = closed_run(tmp_path)
+def test_when_its_owner_is_killed_the_run_is_finished_and_stored(tmp_path, word, ended):
+    with stand(hold_s=0.4 if word == "RunStarted" else 30.0) as simulated:  # held until the kill has come
+        owner = subprocess.Popen(
+            [sys.executable, "-c", OWNER, simulated.port, str(tmp_path), *FILES, word],
+            stdout=subprocess.PIPE,
+        )
+        with owner:
+            engine_id = int(owner.stdout.readline())
+            assert owner.stdout.readline().split() == [word.encode()]
+            owner.send_signal(signal.SIGKILL)
+        run = closed_run(tmp_path)
     assert run.end.ended == ended
     assert len(run) == 2500 or ended == "interrupted"
     assert gone(engine_id)

@@ -128,7 +128,7 @@ def test_the_command_that_probe_prints_records_from_the_defaults_of_the_simulate
 
 def skip_if_polls_were_late(recorded: dict[str, Any], is_polled: bool) -> None:
     lost = (recorded["missing"] + recorded["damaged"]) / recorded["samples"]
-    if is_polled and lost > 0.5:
+    if is_polled and lost > 0.1:  # which the program takes for too busy
         pytest.skip(f"this computer is too busy for its polls: {lost:.0%} of them were late")
 
 
@@ -138,15 +138,15 @@ def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_stati
     settings = {"type": "float32", "order": "CDAB", "function": "4"}
     options = SimulatedStandOptions(protocol="modbus", device=settings, seed=2, **QUICK)
     with SimulatedStand.start(options) as stand:
-        place = ["--port", stand.port, "--protocol", "modbus", "--directory", tmp_path, "--rate", 200]
+        place = ["--port", stand.port, "--protocol", "modbus", "--directory", tmp_path, "--rate", 50]
         given = [part for key, value in settings.items() for part in ("--set", f"{key}={value}")]
         wanted = ["--series", "1FFM0", "--pretrigger", 0.5, "--duration", 4.5, "--json"]
         recorded = slipstand("record", *place, *given, *wanted).json
         true = stand.truth().stand.friction_dynamic
-    assert (recorded["ended"], recorded["rate_hz"]) == ("duration", 200.0)
-    assert "polled at 200 Hz, which is quasi-static" in recorded["message"]
+    assert (recorded["ended"], recorded["rate_hz"]) == ("duration", 50.0)
+    assert "polled at 50 Hz, which is quasi-static" in recorded["message"]
     assert "quasi-static" in open_run(recorded["run"]).end.message
-    assert_replays(recorded["run"], make_source(settings, 200.0))
+    assert_replays(recorded["run"], make_source(settings, 50.0))
     skip_if_polls_were_late(recorded, True)
     (found,) = slipstand("analyze", recorded["run"], "--json").json
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)

@@ -96,6 +96,10 @@ def runs_of(home: Path) -> list[Path]:
 
 
 def screen(desk: Desk, number: int) -> None:
+    desk.wait(
+        lambda: any(one["is_active"] and "MainWindow" in one["kind"] for one in desk.look()),
+        "the window in front of its dialogs",
+    )
     desk.press(f"ctrl+{number}")
 
 
@@ -304,7 +308,8 @@ def close_while_recording(desk: Desk, home: Path) -> None:
     desk.click("Start the simulated stand")
     desk.wait(lambda: desk.button("Arm")["primary"], "a stand that is ready")
     desk.click("Arm")
-    desk.wait(lambda: list((home / "runs").glob("*.recording")), "a run that is recorded")
+    released = ("The plate slides", "Both move together")
+    desk.wait(lambda: any(words in desk.words() for words in released), "the release")
     desk.press("alt+F4")
     desk.wait_for("Closing the window")
     desk.press("Return")
