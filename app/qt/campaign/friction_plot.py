@@ -87,11 +87,7 @@ class FrictionPlot(QWidget):
         self._stack.restyle()
         self._stack.set_time_title("")
         tokens = self._theme.tokens
-        static, dynamic = (
-            f'<span style="color: {token}">{swatch}</span>'
-            for token, swatch in ((tokens.channel_1, "▨"), (tokens.channel_2, "■"))
-        )
-        self._stack.set_title(0, gettext(_TITLE, static=static, dynamic=dynamic))
+        self._stack.set_title(0, gettext(_TITLE, static="▨", dynamic="■"))
         tops: list[float] = []
         for x, bars in enumerate(self._contacts):
             static_x, dynamic_x = x - _WIDTH / 2, x + _WIDTH / 2

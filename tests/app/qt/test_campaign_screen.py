@@ -8,7 +8,7 @@ from campaign_stage import ALL_SERIES, FOLDER, found, path_of, runs_with_a_mode
 from looking import clipped_words, visible_words
 from pointing import Hand
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtGui import QGuiApplication, QTextDocumentFragment
 from PySide6.QtWidgets import QApplication, QMenu, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker
@@ -16,6 +16,7 @@ from stage import Call, FakeWorker
 from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
 from app.presenters.campaign.state import CampaignScope
+from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.screen import CampaignScreen
 from app.qt.theme import Theme
 
@@ -107,6 +108,14 @@ def test_a_campaign_is_drawn(stage: Stage) -> None:
     for expected in ("Campaign: 9 runs in 3 series", "1SSM1", "Contact", "found", "torn.h5: It is no run."):
         assert expected in stage.words()
     assert "FF" in stage.screen._plot._stack.accessibleName()
+
+
+def test_the_title_of_the_figure_shows_no_markup(stage: Stage) -> None:
+    stage.gathered()
+    (figure,) = stage.screen.findChildren(FrictionPlot)
+    (plot,) = figure._stack.plots
+    shown = QTextDocumentFragment.fromHtml(plot.title.text).toPlainText()
+    assert shown.split() == ["friction", "by", "contact", "▨", "static", "fs", "■", "dynamic", "fd"]
 
 
 def test_simulated_runs_are_named_and_chosen_by_a_switch(stage: Stage) -> None:

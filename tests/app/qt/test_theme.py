@@ -4,8 +4,8 @@ import itertools
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QFontInfo, QFontMetricsF
-from PySide6.QtWidgets import QApplication, QLabel
+from PySide6.QtGui import QColor, QFont, QFontInfo, QFontMetricsF
+from PySide6.QtWidgets import QApplication, QLabel, QMenu, QTableWidget, QTreeView, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.qt.theme import DARK, FAMILY, LIGHT, TextRole, Theme, Tokens, font
@@ -88,3 +88,23 @@ def test_the_theme_follows_the_system(theme: Theme, qapp: QApplication, qtbot: Q
         theme.fix(Qt.ColorScheme.Light)
     system.emit(Qt.ColorScheme.Dark)
     assert theme.tokens is LIGHT, "fixed"
+
+
+@pytest.mark.parametrize("kind", [QTableWidget, QTreeView, QMenu])
+def test_the_typeface_holds_where_the_system_gives_a_class_its_own(
+    qapp: QApplication, theme: Theme, qtbot: QtBot, kind: type[QWidget]
+) -> None:
+    """Windows does so for views and menus, at the start and whenever its theme changes."""
+    del theme
+    before = qapp.font(kind.__name__)
+    qapp.setFont(QFont("serif"), kind.__name__)
+    try:
+        made = kind()
+        qtbot.addWidget(made)
+        made.ensurePolished()
+        assert made.font().family() == FAMILY
+        if isinstance(made, QTableWidget):
+            made.horizontalHeader().ensurePolished()
+            assert made.horizontalHeader().font().family() == FAMILY
+    finally:
+        qapp.setFont(before, kind.__name__)
