@@ -47,6 +47,7 @@ from app.runs.exchange import import_run, importing, recognition, sizes, storing
 from app.runs.exchange.exporting import ExportRequest, export_runs
 from app.runs.exchange.reading_process import shared_reading_process
 from app.runs.listing import list_runs
+from app.runs.lock import is_being_recorded
 from app.runs.reader import open_run
 from app.runs.summary import RunSummary
 from app.runs.validator import shared_validator
@@ -65,7 +66,7 @@ _PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
 
 
 def list_folder(folder: str, in_trash: bool, report: ReportProgress) -> tuple[RunSummary, ...]:
-    """Runs of a folder, or with `in_trash` those in its trash."""
+    """Runs of a folder, or with `in_trash` those in its trash; none that is recorded now and so unreadable."""
     path = Path(folder)
     if not path.exists():  # the recordings folder is made by the first run
         return ()
@@ -74,7 +75,8 @@ def list_folder(folder: str, in_trash: bool, report: ReportProgress) -> tuple[Ru
     def on_progress(done: int, count: int) -> None:
         report(Progress(text, done / count))
 
-    return tuple(list_runs(path, progress=on_progress, in_trash=in_trash))
+    runs = list_runs(path, progress=on_progress, in_trash=in_trash)
+    return tuple(run for run in runs if not (run.fault and is_being_recorded(Path(run.path))))
 
 
 def change_runs(

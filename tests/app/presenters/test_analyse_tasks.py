@@ -10,9 +10,10 @@ import pytest
 
 from app.presenters.base import Progress
 from app.presenters.runs.state import RunAnalysed
-from app.presenters.runs.tasks import analyse_runs
+from app.presenters.runs.tasks import analyse_runs, list_folder
 from app.presenters.worker import Worker
 from app.runs.edits import edit_run
+from app.runs.lock import recording_lock
 from app.runs.reader import open_run
 from tests.drills.processes import descendants_of, gone
 from tests.waiting import wait_until
@@ -86,3 +87,12 @@ def test_giving_up_many_keeps_what_is_done_and_leaves_no_process(
     assert all(gone(number) for number in running if number)
     assert len(open_run(done[0].path).analyses) == 1
     assert not [path.name for path in tmp_path.iterdir() if path.suffix != ".h5"]
+
+
+def test_a_run_that_is_recorded_now_is_not_called_unreadable(folder: Path) -> None:
+    (folder / "now.h5").write_text("not yet")
+    with recording_lock(folder / "now.h5"):
+        assert len(list_folder(str(folder), False, lambda _: None)) == 2
+    assert [run.path for run in list_folder(str(folder), False, lambda _: None) if run.fault] == [
+        str(folder / "now.h5")
+    ]
