@@ -66,7 +66,7 @@ _PREVIEW_LINES, _PREVIEW_WIDTH = 12, 160
 
 
 def list_folder(folder: str, in_trash: bool, report: ReportProgress) -> tuple[RunSummary, ...]:
-    """Runs of a folder, or with `in_trash` those in its trash; none that is recorded now and so unreadable."""
+    """Runs of a folder, or with `in_trash` those in its trash; without what is being recorded."""
     path = Path(folder)
     if not path.exists():  # the recordings folder is made by the first run
         return ()
