@@ -141,8 +141,11 @@ def test_a_polled_pullback_has_the_true_friction_and_says_that_it_is_quasi_stati
         place = ["--port", stand.port, "--protocol", "modbus", "--directory", tmp_path, "--rate", 50]
         given = [part for key, value in settings.items() for part in ("--set", f"{key}={value}")]
         wanted = ["--series", "1FFM0", "--pretrigger", 0.5, "--duration", 4.5, "--json"]
-        recorded = slipstand("record", *place, *given, *wanted).json
+        outcome = slipstand("record", *place, *given, *wanted)
         true = stand.truth().stand.friction_dynamic
+    if outcome.code and "a poll takes" in outcome.err:
+        pytest.skip(f"this computer is too busy to poll at 50 Hz: {outcome.err.splitlines()[-1]}")
+    recorded = outcome.json
     assert (recorded["ended"], recorded["rate_hz"]) == ("duration", 50.0)
     assert "polled at 50 Hz, which is quasi-static" in recorded["message"]
     assert "quasi-static" in open_run(recorded["run"]).end.message

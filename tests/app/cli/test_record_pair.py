@@ -35,6 +35,9 @@ def two_stands(**options: Any):
 
 def skip_where_polls_were_late(recorded: dict[str, Any]) -> None:
     """Leave out what follows on a computer too busy for its polls, which the program has to say."""
+    if recorded["rate_hz"] < 30.0:
+        assert "quasi-static" in recorded["message"]
+        pytest.skip(f"this computer is too busy to poll: {recorded['rate_hz']:g} Hz miss the release")
     late = (recorded["missing"] + recorded["damaged"]) / recorded["samples"]
     if late > 0.1:
         assert "too busy to poll" in recorded["message"]
