@@ -91,7 +91,9 @@ _FOLLOWED_BIC = 100.0  # above one and a half times the best: sets farther off a
 _FOLLOWED = 3  # sets of effects that are followed from one window to the next
 _STATIC_RATIOS = np.concatenate((np.linspace(1.01, 1.4, 14), np.geomspace(1.45, 4.3, 12)))
 """f_s over f_d; 4.3 on oiled steel in the paper's Table 1."""
-_RAMP, _STEP, _FILTER = effects_by_name(("release-ramp", "release-step", "filter"))
+_RAMP, _STEP, _VELOCITY, _FILTER = effects_by_name(
+    ("release-ramp", "release-step", "release-velocity", "filter")
+)
 _TWO_STEPS = ((1.0, 0.85), (1.5, 0.6))
 """Length of a release over that of a slow one that passes for it, and share of the force lost at once."""
 _NOTHING = QuadraticModel(0.0, np.empty(0), np.empty((0, 0)))
@@ -247,7 +249,7 @@ class StandSearch:
 
         `best` is one of the `others`, too.
         """
-        alike = self._in_two_steps(window, best)
+        alike = [*self._in_two_steps(window, best), *self._with_slow_release(window, best)]
         trial, evidence = self._without_needless(window, min((best, *alike), key=_bic_of))
         friction = self._friction(window, trial.model, trial.point)
         rivals = [
@@ -310,6 +312,24 @@ class StandSearch:
             point = start.copy()
             point[_PLACES[StandParameter.RELEASE_RAMP]] *= ramp
             point[_PLACES[StandParameter.RELEASE_STEP]] = step
+            found.append(self._trial(window, effects, point))
+        return [min(found, key=_bic_of)]
+
+    def _with_slow_release(self, window: FitProblem, trial: _Trial) -> list[_Trial]:
+        """A trial of a table that moved at the release, with a slow release in its place.
+
+        None of any other trial. Both shift the start of the motion alike, so that a search that met the
+        velocity first ends there.
+        """
+        if _VELOCITY.name not in trial.names or _RAMP.name in trial.names:
+            return []
+        effects = tuple(_RAMP if effect is _VELOCITY else effect for effect in trial.model.effects)
+        found = []
+        for (ramp_s,) in _RAMP.probes:
+            point = trial.point.copy()
+            point[_PLACES[StandParameter.RELEASE_VELOCITY]] = 0.0
+            point[_PLACES[StandParameter.RELEASE_RAMP]] = ramp_s
+            point[Parameter.RELEASE] -= 0.5 * ramp_s
             found.append(self._trial(window, effects, point))
         return [min(found, key=_bic_of)]
 

@@ -232,7 +232,7 @@ def _fit(channel: Channel, start: Parameters, order: int, free: list[int]) -> On
     scale = _scales(start, order)
     origin = np.array(start)
     end_s = float(channel.time_s[-1])
-    if not start.swings_like(start, end_s):
+    if not start.swings_like(start, end_s) or len(channel) < len(free):
         raise _no_decay(start.period_s)
 
     def unpack(steps: Floats) -> Parameters:
