@@ -38,6 +38,7 @@ from app.qt.widgets.text import ValueGrid, label, set_text_or_hide, set_tool_tip
 from messages.i18n import N_, gettext
 
 _COLUMN_WIDTH = 256
+_FIELD_WIDTH = 100
 _DEGREES = {1: N_("line"), 2: N_("polynomial of degree 2"), 3: N_("polynomial of degree 3")}
 _HOW = N_(
     "Move the table in even steps up and down, twice or more. At each step type what the dial shows; Enter."
@@ -74,6 +75,8 @@ class CalibratePanel(QWidget):
         self._degree.activated.connect(lambda _: self._fill(degree=self._degree.currentData()))
         self._filter = make_choice(_FILTERS)
         self._filter.activated.connect(lambda _: self._fill(filter_kind=self._filter.currentData()))
+        for choice in (self._degree, self._filter):  # not as wide as their longest text
+            choice.setMinimumWidth(_FIELD_WIDTH)
         self._fields = make_fields(_FIELDS, self._fill)
         self._use = CheckBox(gettext("Take it for all runs from now on"))
         self._use.clicked.connect(lambda is_used: self._fill(use=is_used))

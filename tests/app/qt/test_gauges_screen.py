@@ -181,6 +181,14 @@ def test_keys_reach_every_tab_and_the_ports(stage: Stage) -> None:
     assert stage.prober.calls[-1].arguments == (False, "")
 
 
+def test_fields_of_a_calibration_are_whole_on_a_small_screen(stage: Stage) -> None:
+    stage.presenter.set_tab(GaugesTab.CALIBRATE)
+    stage.screen.resize(866, 540)  # of a window of 960, as on 1920 x 1080 at 200 %
+    QApplication.processEvents()
+    (area,) = stage.screen._calibrate.findChildren(QScrollArea)
+    assert area.widget().minimumSizeHint().width() <= area.viewport().width()
+
+
 def test_one_click_takes_what_a_port_suggests(stage: Stage) -> None:
     stage.presenter.set_tab(GaugesTab.PORTS)
     stage.presenter.ports.probe()
