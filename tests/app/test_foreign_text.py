@@ -11,7 +11,7 @@ import numpy as np
 import openpyxl
 import pytest
 from markdown_it import MarkdownIt
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QCoreApplication, QEvent, Qt
 from PySide6.QtGui import QTextDocument
 from PySide6.QtWidgets import QLabel, QMessageBox, QPushButton, QWidget
 
@@ -192,13 +192,37 @@ def test_widgets_show_text_as_it_is(qtbot, poison):
     assert button.shortcut().isEmpty()
 
 
+@pytest.fixture(scope="module")
+def theme(qapp):
+    return Theme(qapp, Qt.ColorScheme.Light)
+
+
+@pytest.fixture
+def stack(theme):
+    made = PlotStack(theme, (("", "text"),))
+    yield made
+    delete(made)
+
+
+@pytest.fixture
+def preview(theme):
+    made = RunsPreview(theme)
+    yield made
+    delete(made)
+
+
+def delete(widget):
+    """Delete a widget at once, and not where Python happens to collect it, in the midst of an event."""
+    widget.deleteLater()
+    QCoreApplication.sendPostedEvents(widget, QEvent.Type.DeferredDelete)
+
+
 @poisons
-def test_plots_show_text_as_it_is(qapp, qtbot, poison):
+def test_plots_show_text_as_it_is(stack, poison):
     """Titles, readout and the title of an axis: what pyqtgraph takes for HTML."""
-    stack = PlotStack(Theme(qapp, Qt.ColorScheme.Light), ((poison, "text"),))
-    qtbot.addWidget(stack)
     seen = folded(show_control_characters(poison))
     (plot,) = stack.plots
+    stack.set_title(0, poison)
     stack.set_readout(0, poison)
     stack.set_time_title(poison)
     stack.restyle()
@@ -208,9 +232,7 @@ def test_plots_show_text_as_it_is(qapp, qtbot, poison):
 
 
 @poisons
-def test_the_legend_of_runs_shows_text_as_it_is(qapp, qtbot, poison):
-    preview = RunsPreview(Theme(qapp, Qt.ColorScheme.Light))
-    qtbot.addWidget(preview)
+def test_the_legend_of_runs_shows_text_as_it_is(preview, poison):
     seen, line = folded(show_control_characters(poison)), np.zeros(3)
     trace = Trace(poison, np.arange(3.0), line, line)
     preview.show_overlay(Overlay((trace, trace)))

@@ -62,6 +62,7 @@ def test_document_is_that_of_the_interface(run_path):
     assert (document["run"], document["series"], document["kind"]) == (str(run_path), "1FFM1", "two-mass")
     assert document["results"]["friction_dynamic"] == {
         "value": 0.1001, "standard_uncertainty": 0.0004, "interval_95": [0.0993, 0.1009], "unit": "1",
+        "expanded_uncertainty": 0.0008, "coverage_factor": 2.0,
     }  # fmt: skip
     assert document["results"]["msk64_degree"] == "IX"
     assert document["results"]["coulomb_significant"] is False
