@@ -19,8 +19,8 @@ import pytest
 from app.__main__ import main
 
 OLD_RUNS = Path(__file__).resolve().parents[2] / "golden" / "old_runs"
-RELATIVE_DIFFERENCE = 1e-9
-"""Between processors and builds of LAPACK; the same machine gives the same bits."""
+RELATIVE_DIFFERENCE = 1e-6
+"""Between processors, builds of LAPACK and orders of summation, above all of small budget lines."""
 DRAWN = {"slip_end_uncertainty_s": 1e-3}
 """Relative differences of what is counted over drawn parameters: rounding moves where single draws end."""
 
@@ -77,7 +77,7 @@ def assert_same(now: Any, then: Any, where: str, relative: float = RELATIVE_DIFF
         for number, (one, other) in enumerate(zip(now, then, strict=True)):
             assert_same(one, other, f"{where}[{number}]")
     elif isinstance(then, float):
-        assert now == pytest.approx(then, rel=relative, abs=1e-14, nan_ok=True), where
+        assert now == pytest.approx(then, rel=relative, abs=1e-12, nan_ok=True), where
     else:
         assert now == then, where
 
