@@ -87,6 +87,7 @@ class ShadedSpans(_Backdrop):
 
     def show_spans(self, spans: tuple[tuple[float, float], ...]) -> None:
         self._spans = spans
+        self.setVisible(bool(spans))
         self.update()
 
     def set_brush(self, brush: Any) -> None:
@@ -95,7 +96,8 @@ class ShadedSpans(_Backdrop):
 
     def paint(self, painter: QPainter, *_: Any) -> None:
         seen = self.viewRect()
-        self._brush.setTransform(painter.worldTransform().inverted()[0])  # a hatching has the pitch of pixels
+        if self._brush.style() is not Qt.BrushStyle.SolidPattern:  # a hatching has the pitch of pixels
+            self._brush.setTransform(painter.worldTransform().inverted()[0])
         for start, end in self._spans:
             left, right = max(start, seen.left()), min(end, seen.right())
             if left < right:
