@@ -28,6 +28,7 @@ _Value = TypeVar("_Value")
 _Fill = TypeVar("_Fill")
 _NUMBER_GAP = 8  # pixels between a number and its uncertainty
 _SLACK = 0.97  # figures grow in whole pixels: not quite in proportion to their font
+_FACTOR_MIN = 0.05  # of the usual size: smaller figures are not to be read
 _SYMBOL = re.compile(r"\b([fuva])_(d|s|max)\b")
 _MARKUP = re.compile("<sub>|&nbsp;")
 _ESCAPED_MARKUP = re.compile("&lt;/?sub&gt;|&amp;nbsp;")
@@ -224,9 +225,11 @@ class ValueLabel(QWidget):
         heights = [part.sizeHint().height() for part in shown] or [0]
         names = self._name.sizeHint().height() if self._named else 0
         self.setMinimumHeight(names + (sum(heights) if is_wide else max(heights)))  # a low card scrolls
-        widest = max(widths, default=0)
-        if widest > self.width() > 0:
-            self._scale_fonts(_SLACK * self.width() / widest)
+        factor, widest = 1.0, max(widths, default=0)
+        while widest > self.width() > 0 and factor > _FACTOR_MIN:  # hinting widens small figures again
+            factor *= _SLACK * self.width() / widest
+            self._scale_fonts(factor)
+            widest = max(part.sizeHint().width() for part in shown)
 
     def _scale_fonts(self, factor: float) -> None:
         for part, role in zip((self._value, self._spread), self._roles, strict=True):

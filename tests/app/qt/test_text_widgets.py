@@ -34,7 +34,7 @@ LONG = (
     ResultRow("f<sub>d</sub>", "dynamic friction coefficient", "0.100301234", "0.000000064"),
     ResultRow("T", "period of the joint motion", "−12345.678901", "0.000048", "ms"),
     ResultRow(
-        "T", "period of the joint motion", "319.94212345678901234567", "0.0000000000000000000048", "ms"
+        "T", "period of the joint motion", "319.9421234567890123456789", "0.0000000000000000000048", "ms"
     ),
     ResultRow("f<sub>d</sub>", "коэффициент трения скольжения", "не определено"),
     ResultRow("", "", "Nothing has come out of this"),
