@@ -10,7 +10,6 @@ and the list of runs have them in the order of their beginnings.
 import argparse
 import datetime
 import sys
-import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,7 +35,7 @@ from config.files import settings_file
 from tests.drills.kill_engine import ask
 from tests.drills.power_loss import environment
 from tests.drills.preload import CLOCK, build_library, has_compiler
-from tests.drills.report import DrillReport
+from tests.drills.report import DrillReport, chosen_ways, run_ways
 from tests.drills.sent import Sent
 from tests.drills.unplug import wait_for
 
@@ -67,7 +66,7 @@ class ClockReport(DrillReport):
     """Longest time between two reports of health."""
 
     def figures(self) -> str:
-        return f"{self.way}: {self.samples} samples, health each {self.health_s:.1f} s at most; {self.said}"
+        return f"{self.samples} samples, health each {self.health_s:.1f} s at most; {self.said}"
 
 
 class Clock:
@@ -177,14 +176,8 @@ def main() -> int:
     if not has_compiler():
         sys.stdout.write("there is no C compiler here, or this is not Linux\n")
         return 1
-    faults = 0
-    for way in given.ways.split(","):
-        with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
-            report = set_clock(way, Path(folder))
-        sys.stdout.write(f"{report}\n")
-        sys.stdout.flush()
-        faults += len(report.faults)
-    return 1 if faults else 0
+    ways = chosen_ways(parser, given.ways, WAYS)
+    return run_ways(len(ways), {way: lambda _, folder, way=way: set_clock(way, folder) for way in ways})
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ import argparse
 import random
 import socket
 import sys
-import tempfile
 import threading
 import time
 from collections.abc import Callable
@@ -36,7 +35,7 @@ from config.files import settings_file
 from drivers.crc import crc16
 from drivers.devices.slipstand_binary.codec import SYNC, frame_length, samples_per_frame
 from tests.drills.kill_engine import ask
-from tests.drills.report import DrillReport
+from tests.drills.report import DrillReport, chosen_ways, run_ways
 from tests.drills.sent import Sent
 
 RATE_HZ = 500.0
@@ -81,13 +80,12 @@ WAYS = (*WIRES, *RATES, *ADDRESSES)
 class WireReport(DrillReport):
     """What came of it."""
 
-    way: str
     said: str = ""
     samples: int = 0
     memory_bytes: int = 0
 
     def figures(self) -> str:
-        return f"{self.way}: {self.samples} samples, {self.memory_bytes / 1e6:.0f} MB; {self.said}"
+        return f"{self.samples} samples, {self.memory_bytes / 1e6:.0f} MB; {self.said}"
 
 
 class Proxy(threading.Thread):
@@ -151,7 +149,7 @@ def _frames(data: bytes) -> tuple[list[bytes], bytes]:
 
 def hostile_wire(way: str, folder: Path, seed: int = 0) -> WireReport:
     """Record one run in an empty folder while the wire does what `way` says."""
-    report = WireReport(way)
+    report = WireReport()
     try:
         if way in ADDRESSES:
             _no_device(way, folder, report)
@@ -243,14 +241,10 @@ def main() -> int:
     parser.add_argument("--ways", default=",".join(WAYS), help="separated by commas")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    faults = 0
-    for way in given.ways.split(","):
-        with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
-            report = hostile_wire(way, Path(folder), given.seed)
-        sys.stdout.write(f"{report}\n")
-        sys.stdout.flush()
-        faults += len(report.faults)
-    return 1 if faults else 0
+    ways = chosen_ways(parser, given.ways, WAYS)
+    return run_ways(
+        len(ways), {way: lambda _, folder, way=way: hostile_wire(way, folder, given.seed) for way in ways}
+    )
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ import sys
 import tempfile
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -82,6 +82,15 @@ def arguments(description: str | None, count: int, seed: int | None = None) -> a
     parser.add_argument("--count", type=int, default=count, help="in all")
     parser.add_argument("--seed", type=int, default=seed)
     return parser
+
+
+def chosen_ways(parser: argparse.ArgumentParser, given: str, known: Sequence[str]) -> list[str]:
+    """Ways as they were given, separated by commas. Ends the program where one is not `known`."""
+    ways = list(filter(None, given.split(",")))
+    for way in ways:
+        if way not in known:
+            parser.error(f"{way!r} is none of {', '.join(known)}")
+    return ways
 
 
 def run_ways(

@@ -15,7 +15,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import uuid
@@ -30,7 +29,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from tests.drills.disk_full import may_mount, small_disk
 from tests.drills.kill_engine import ask
-from tests.drills.report import DrillReport
+from tests.drills.report import DrillReport, chosen_ways, run_ways
 from tests.drills.sent import Sent
 
 RATE_HZ = 500.0
@@ -82,14 +81,13 @@ REMEDIES[LATER] = REMEDIES["no files"]
 class ResourceReport(DrillReport):
     """What came of one program that lacked something."""
 
-    what: str
     code: int | None = None
     said: str = ""
     took_s: float = 0.0
     samples: int = 0
 
     def figures(self) -> str:
-        return f"{self.what}: exit {self.code} after {self.took_s:.1f} s, {self.samples} samples; {self.said}"
+        return f"exit {self.code} after {self.took_s:.1f} s, {self.samples} samples; {self.said}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,7 +267,7 @@ PROGRAMS: dict[str, Callable[[Trial], None]] = {
 
 def lacking(program: str, way: str, place: Path) -> ResourceReport:
     """Let a program of `PROGRAMS` lack something of `WAYS`, in an empty folder."""
-    report = ResourceReport(f"{program}, {way}")
+    report = ResourceReport()
     trial = Trial(way, place, report)
     trial.runs.mkdir()
     shutil.copytree(settings_file("stand.toml").parent, place / "slipstand_config")
@@ -294,17 +292,19 @@ def main() -> int:
     parser.add_argument("--programs", default=",".join(PROGRAMS), help="separated by commas")
     parser.add_argument("--ways", default=",".join(possible_ways()), help="separated by commas")
     given = parser.parse_args()
-    faults = 0
-    for program in given.programs.split(","):
-        for way in filter(None, given.ways.split(",")):
-            if (way == LATER and program != "record") or (program == "window" and way in DISKS):
-                continue
-            with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
-                report = lacking(program, way, Path(folder))
-            sys.stdout.write(f"{report}\n")
-            sys.stdout.flush()
-            faults += len(report.faults)
-    return 1 if faults or not given.ways else 0
+    cases = [
+        (program, way)
+        for program in given.programs.split(",")
+        for way in chosen_ways(parser, given.ways, WAYS)
+        if not ((way == LATER and program != "record") or (program == "window" and way in DISKS))
+    ]
+    return run_ways(
+        len(cases),
+        {
+            f"{program}, {way}": lambda _, folder, program=program, way=way: lacking(program, way, folder)
+            for program, way in cases
+        },
+    )
 
 
 if __name__ == "__main__":
