@@ -15,7 +15,7 @@ from pytestqt.qtbot import QtBot
 from analysis.quantities import Quantity
 from app.presenters.composition import make_window_presenter
 from app.presenters.number_text import format_uncertain
-from app.presenters.record.state import Action
+from app.presenters.record.state import Action, RecordState
 from app.presenters.screens import Screen
 from app.presenters.window import WindowPresenter
 from app.qt.runs.export_dialog import ExportDialog
@@ -64,17 +64,28 @@ def seconds_after_release(presenter: WindowPresenter) -> float:
     return float(traces.table.time_s[-1]) if traces.marks.release_s is not None else 0.0
 
 
+class Shown:
+    """Keeps what the operator was told, also where a busy computer shows it between two looks."""
+
+    def __init__(self) -> None:
+        self.instructions = set[str]()
+
+    def show_state(self, state: RecordState) -> None:
+        self.instructions.add(state.guidance.instruction)
+
+
 def test_a_pullback_is_recorded_and_its_friction_found(
     window: MainWindow, presenter: WindowPresenter, qtbot: QtBot, tmp_path: Path
 ) -> None:
     arm_when_possible(window, presenter, qtbot)
-    record = presenter.record
+    record, shown = presenter.record, Shown()
+    record.attach(shown)
 
     def in_the_tail() -> bool:
-        is_tail = record.state.guidance.instruction == "Both move together"
-        return is_tail and seconds_after_release(presenter) > 3.0
+        return "Both move together" in shown.instructions and seconds_after_release(presenter) > 3.0
 
     qtbot.waitUntil(in_the_tail, timeout=PATIENCE_MS)
+    assert {"The stand pulls back to 6.0\u202fmm", "The plate slides"} <= shown.instructions
     qtbot.keyClick(window, Qt.Key.Key_Escape)
     qtbot.waitUntil(lambda: record.state.result is not None, timeout=PATIENCE_MS)
 
