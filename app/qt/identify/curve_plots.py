@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pyqtgraph as pg
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QColor
 from PySide6.QtWidgets import QWidget
 
 from app.presenters.identify.state import ChannelCurves, Curves, Floats, ManualFit, PlotLine, ReadingUnit
 from app.qt.identify.cursors import CursorLines
-from app.qt.theme import Theme
+from app.qt.theme import Theme, mixed
 from app.qt.widgets.layouts import make_column
 from app.qt.widgets.plot_curves import Curve
 from app.qt.widgets.plot_marks import ShadedSpans, hatching, pen, place_region, shade, shaded_region
@@ -152,7 +151,7 @@ class CurvePlots(QWidget):
             self._simulations[row].setPen(dashed)
             self._hand_simulations[row].setPen(dashed)
             self._residuals[row].setPen(pen(token, alpha=0.5))
-            self._hand_residuals[row].setPen(pen(_mixed(token, tokens.surface)))
+            self._hand_residuals[row].setPen(pen(mixed(token, tokens.surface, 0.5)))
         for slip in self._slips:
             slip.set_brush(shade(tokens.channel_2, tokens.slip_alpha))
         for unused in self._unused:
@@ -192,13 +191,3 @@ def _set_line(curve: Curve, line: PlotLine | None) -> None:
     curve.setVisible(line is not None)
     if line is not None:
         curve.show_points(line.time_s, line.values)
-
-
-def _mixed(token: str, ground: str) -> str:
-    """Half of a colour on a ground: as light as a transparent line, and drawn in a quarter of the time."""
-    line, behind = QColor(token), QColor(ground)
-    return QColor(
-        (line.red() + behind.red()) // 2,
-        (line.green() + behind.green()) // 2,
-        (line.blue() + behind.blue()) // 2,
-    ).name()

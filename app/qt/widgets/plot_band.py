@@ -11,6 +11,10 @@ from app.presenters.decimated_history import Polyline
 
 Floats = NDArray[np.float64]
 
+_BLOCK_ROWS = 32
+"""Rows of pixels made at once: memory for all of them would be asked from the system anew with each frame,
+and takes six times as long as the arithmetic."""
+
 
 class Band:
     """Draws a line of lowest and highest values of spans, into pictures only.
@@ -18,12 +22,18 @@ class Band:
     As a polygon Qt would fill it in a time that grows with the square of its edges, up to seconds.
     """
 
-    def __init__(self, line: Polyline) -> None:
-        self._starts_s, self._low, self._high = line.time_s[::2], line.value[::2], line.value[1::2]
-        self._end_s = 2.0 * line.time_s[-1] - line.time_s[-3]
+    def __init__(self) -> None:
+        self._starts_s = self._low = self._high = np.empty(0)
+        self._end_s = 0.0
         self._made_for: tuple[object, ...] = ()
         self._image = QImage()
         self._pixels = np.empty((0, 0), np.uint32)  # of the image, which does not own them
+
+    def show_line(self, line: Polyline) -> None:
+        """Draw another line from now on, of two spans at least."""
+        self._starts_s, self._low, self._high = line.time_s[::2], line.value[::2], line.value[1::2]
+        self._end_s = 2.0 * line.time_s[-1] - line.time_s[-3]
+        self._made_for = ()
 
     def paint(self, painter: QPainter, seen: QRectF, ink: QColor) -> None:
         """Fill the part `seen`, in units of the line, through the transform of the painter."""
@@ -47,15 +57,21 @@ class Band:
         )
         columns = np.flatnonzero((np.arange(width) + 1.0 > x[0]) & (np.arange(width) < x[-1]))
         tops, bottoms = _columns(columns, x, highest, lowest)
-        is_filled = np.zeros((height + 1, width), np.uint8)
-        is_filled[tops.clip(0, height), columns] = 1
-        is_filled[bottoms.clip(0, height), columns] -= 1
-        np.cumsum(is_filled, axis=0, out=is_filled)
-        # In the format of the screen: Qt would convert another one in other threads, and wait for them.
-        self._pixels = np.multiply(is_filled[:height], _premultiplied(ink), dtype=np.uint32)
-        self._image = QImage(
-            self._pixels.data, width, height, 4 * width, QImage.Format.Format_ARGB32_Premultiplied
-        )
+        # A row is filled from the first to the last of its column: one comparison, since whole numbers wrap.
+        top_rows, row_counts = np.zeros((2, width), np.uint16)
+        top_rows[columns] = tops.clip(0, height)
+        row_counts[columns] = bottoms.clip(0, height) - top_rows[columns]
+        if self._pixels.shape != (height, width):
+            self._pixels = np.empty((height, width), np.uint32)
+            # In the format of the screen: Qt would convert another one in other threads, and wait for them.
+            self._image = QImage(
+                self._pixels.data, width, height, 4 * width, QImage.Format.Format_ARGB32_Premultiplied
+            )
+        rows = np.arange(height, dtype=np.uint16)[:, np.newaxis]
+        for first in range(0, height, _BLOCK_ROWS):
+            block = slice(first, first + _BLOCK_ROWS)
+            is_filled = (rows[block] - top_rows < row_counts).view(np.uint8)
+            np.multiply(is_filled, _premultiplied(ink), out=self._pixels[block], dtype=np.uint32)
         self._image.setDevicePixelRatio(ratio)
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
+from PySide6.QtCore import QRectF
 from PySide6.QtGui import QPaintEngine, QPainter
 from PySide6.QtWidgets import QGraphicsItem
 
@@ -31,12 +32,17 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
     def __init__(self, *, antialias: bool = True) -> None:
         super().__init__(antialias=antialias)
         self._polyline = Polyline.empty()
-        self._band: Band | None = None
+        self._band = Band()
+        self._is_band = False
 
     def setPen(self, *arguments: Any, **options: Any) -> None:  # noqa: N802
         super().setPen(*arguments, **options)
         if self.opts["fillLevel"] is not None:
             self.setBrush(self.opts["pen"].color())
+
+    def boundingRect(self) -> QRectF:  # noqa: N802
+        """All that is in view: pyqtgraph looks for the extremes of all points anew at each step of a zoom."""
+        return QRectF(self.viewRect()) if len(self.xData) else QRectF()
 
     def samples(self) -> tuple[Floats, Floats]:
         """All points (n,), which a table of the plot has."""
@@ -44,7 +50,7 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def show_points(self, x: Floats, y: Floats) -> None:
         """Draw few points (n,) each, in any order; NaN breaks the line."""
-        self._polyline, self._band = Polyline(x, y), None
+        self._polyline, self._is_band = Polyline(x, y), False
         self.setData(x, y, connect="finite")
 
     def keep_picture(self, *, kept: bool) -> None:
@@ -57,7 +63,7 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def show_polyline(self, line: Polyline) -> None:
         """Draw a line; one of lowest and highest values as a band, where strokes could not be told apart."""
-        self._polyline, self._band = line, None
+        self._polyline, self._is_band = line, False
         if not self._is_dense(line):
             self._show_strokes(line, is_dense=False)
         elif not line.is_min_max:
@@ -65,12 +71,13 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
         elif self._strokes(_edges(line)) < _SMOOTH_STROKES and not line.has_gaps:
             self._show_polygon(line)
         else:
-            self._band = Band(line)
+            self._is_band = True
+            self._band.show_line(line)
             self._show_strokes(line, is_dense=True)
 
     def paint(self, painter: QPainter, *arguments: Any) -> None:
         is_picture = painter.paintEngine().type() == QPaintEngine.Type.Raster
-        if self._band is None or not is_picture:  # a drawing has strokes
+        if not (self._is_band and is_picture):  # a drawing has strokes
             super().paint(painter, *arguments)
         else:
             self._band.paint(painter, self.getViewBox().viewRect(), self.opts["pen"].color())

@@ -7,14 +7,14 @@ import pyqtgraph as pg
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
 from PySide6.QtGui import QBrush, QColor, QPainter
 
-from app.qt.theme import Tokens, colour
+from app.qt.theme import Tokens, colour, mixed
 
 if TYPE_CHECKING:
     from app.qt.widgets.plots import Plot
 
 _BEHIND, _ABOVE = -10, 30
-_GRID_OPACITIES = (0.2, 0.1)
-"""Of lines at ticks with a number, and between them."""
+_GRID_SHARES = (0.2, 0.1)
+"""Of the ink in lines at ticks with a number, and between them."""
 
 
 def pen(token_colour: str | QColor, *, alpha: float = 1.0, dashes: Sequence[float] = ()) -> Any:
@@ -112,18 +112,18 @@ class Grid(_Backdrop):
 
     def __init__(self, plot: "Plot") -> None:
         self._axes = (plot.bottom, plot.left)
-        self._colour = QColor()
+        self._pens: list[Any] = []
         super().__init__(plot, 2 * _BEHIND)
 
-    def set_colour(self, ink: str) -> None:
-        self._colour = QColor(ink)
+    def restyle(self, tokens: Tokens) -> None:
+        self._pens = [pen(mixed(tokens.muted, tokens.surface, share)) for share in _GRID_SHARES]
         self.update()
 
     def paint(self, painter: QPainter, *_: Any) -> None:
         seen = self.viewRect()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-        for level, opacity in enumerate(_GRID_OPACITIES):
-            painter.setPen(pen(self._colour, alpha=opacity))
+        for level, grid_pen in enumerate(self._pens):
+            painter.setPen(grid_pen)
             across, along = (axis.ticks_in_view(level) for axis in self._axes)
             lines = [QLineF(x, seen.top(), x, seen.bottom()) for x in across]
             painter.drawLines(lines + [QLineF(seen.left(), y, seen.right(), y) for y in along])

@@ -115,7 +115,7 @@ class Plot:
             axis.setPen(pg.mkPen(tokens.line, width=1))
             axis.setTickPen(pg.mkPen(tokens.muted, width=1))
             axis.setTextPen(pg.mkPen(tokens.muted))
-        self._grid.set_colour(tokens.muted)
+        self._grid.restyle(tokens)
 
     def _axis(self, side: str) -> Any:
         axis = _Axis(side, self.view)

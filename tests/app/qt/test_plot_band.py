@@ -19,7 +19,9 @@ def drawn(line: Polyline, seen: QRectF, ink: QColor, ratio: float = 1.0) -> QIma
     painter = QPainter(image)
     painter.scale(WIDTH / seen.width(), -HEIGHT / seen.height())
     painter.translate(-seen.left(), -seen.bottom())
-    Band(line).paint(painter, seen, ink)
+    band = Band()
+    band.show_line(line)
+    band.paint(painter, seen, ink)
     painter.end()
     return image
 
