@@ -15,6 +15,8 @@ _LEAST = QSize(940, 500)
 """Texts are cut in a smaller window."""
 _GRIP = QSize(160, 40)
 """Part of the title bar that must be on a screen, so that the mouse can move the window."""
+_FRAME = QSize(16, 40)
+"""Room for title bar and borders, which are known only when a window is shown. Windows 11 takes 16 x 39."""
 
 
 def persist_layout(part: QHeaderView | QSplitter, name: str) -> None:
@@ -31,21 +33,28 @@ class WindowGeometry:
         return self._place.screen
 
     def restore_window(self, window: QMainWindow) -> None:
-        """Restore size and place; a place that is on no screen any more becomes the middle of the first."""
+        """Restore size and place; a place that is on no screen any more becomes the middle of the first.
+
+        A window that is too large for its screen with title bar and borders is maximized, unless that would
+        cut its texts: the mouse can move one that is larger than the screen.
+        """
         place = self._place
         wanted = QRect(place.x, place.y, place.width or _USUAL.width(), place.height or _USUAL.height())
         room = _room_for(wanted) if place.width else None
         free = room or QGuiApplication.primaryScreen().availableGeometry()
-        window.resize(wanted.size().boundedTo(free.size()))
+        inside = free.size() - _FRAME
+        window.resize(wanted.size().boundedTo(inside))
         if place.width:
             window.move(wanted.topLeft() if room else free.center() - window.rect().center())
-        if place.maximized:
+        is_too_large = wanted.size().boundedTo(inside) != wanted.size()
+        can_fill = _LEAST.boundedTo(free.size()) == _LEAST
+        if place.maximized or (is_too_large and can_fill):
             window.setWindowState(Qt.WindowState.WindowMaximized)
 
     def within_screen(self, smallest: QSize) -> QSize:
-        """Limit a size to that of the screen: a scale of 200 % leaves 960 x 540 of 1920 x 1080."""
+        """Limit a size to the screen without a frame: a scale of 200 % leaves 960 x 540 of 1920 x 1080."""
         free = QGuiApplication.primaryScreen().availableSize()
-        return smallest.boundedTo(free).expandedTo(_LEAST)
+        return smallest.boundedTo(free - _FRAME).expandedTo(_LEAST)
 
     def restore_parts(self, screen: QWidget) -> None:
         for name, part in _parts(screen):

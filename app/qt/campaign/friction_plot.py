@@ -25,7 +25,7 @@ _HEADROOM = 1.08
 _TICKS_HEIGHT, _ROOM = 44, 220
 """Of two lines below the axis, and for the name of a contact, in pixels."""
 
-
+_STATIC, _DYNAMIC = "▨", "■"
 _TITLE = N_("friction by contact &nbsp; {static} static f<sub>s</sub> &nbsp; {dynamic} dynamic f<sub>d</sub>")
 _COLUMNS: tuple[tuple[str, Callable[[Quantity], float]], ...] = (
     ("{symbol}", lambda mean: mean.value),
@@ -87,7 +87,8 @@ class FrictionPlot(QWidget):
         self._stack.restyle()
         self._stack.set_time_title("")
         tokens = self._theme.tokens
-        self._stack.set_title(0, gettext(_TITLE, static="▨", dynamic="■"))
+        title = gettext(_TITLE, static=_STATIC, dynamic=_DYNAMIC)
+        self._stack.set_title(0, title, {_STATIC: "channel_1", _DYNAMIC: "channel_2"})
         tops: list[float] = []
         for x, bars in enumerate(self._contacts):
             static_x, dynamic_x = x - _WIDTH / 2, x + _WIDTH / 2

@@ -1,7 +1,8 @@
 """Plots below one another with one time axis, with the gestures, keys and menu that all plots have."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -147,7 +148,7 @@ class PlotStack(QFrame):
         super().__init__()
         QPixmapCache.setCacheLimit(_CACHE_KB)
         self._theme = theme
-        self._titles = list(titles)
+        self._titles = [_Title(text, token) for text, token in titles]
         self._time_title = ""
         self._format_point = format_point
         self.pointer: tuple[int, QPointF] | None = None
@@ -178,15 +179,15 @@ class PlotStack(QFrame):
         self._canvas.setBackground(tokens.surface)
         self._crosshair.restyle(tokens)
         self._tools.restyle(tokens)
-        for plot, (text, token) in zip(self.plots, self._titles, strict=True):
-            _write(plot.title, text, getattr(tokens, token))
+        for plot, title in zip(self.plots, self._titles, strict=True):
+            title.write(plot.title, tokens)
             plot.restyle(tokens)
         self.set_time_title(self._time_title)
 
-    def set_title(self, row: int, text: str) -> None:
-        _, token = self._titles[row]
-        self._titles[row] = text, token
-        _write(self.plots[row].title, text, getattr(self._theme.tokens, token))
+    def set_title(self, row: int, text: str, swatches: Mapping[str, str] | None = None) -> None:
+        """Write a title; each of `swatches`, one character in it, has the colour token given for it."""
+        self._titles[row] = replace(self._titles[row], text=text, swatches=swatches or {})
+        self._titles[row].write(self.plots[row].title, self._theme.tokens)
 
     def set_plot_visible(self, row: int, *, shown: bool) -> None:
         """Show a plot, or only its title (and the time axis, of the last)."""
@@ -382,9 +383,23 @@ def value_extent(*lines: Floats) -> tuple[float, float]:
     return low - margin, high + margin
 
 
-def _write(item: Any, text: str, text_colour: str) -> None:
-    """Set the text of a label; a wide one is cut instead of moving the plot."""
-    styled = f'<span style="color: {text_colour}; font-size: 12px">{markup(text)}</span>'
+@dataclass(frozen=True)
+class _Title:
+    """Rich text, its colour token, and the tokens of single characters in it that have another colour."""
+
+    text: str
+    token: str
+    swatches: Mapping[str, str] = field(default_factory=dict)
+
+    def write(self, item: Any, tokens: Tokens) -> None:
+        inks = {swatch: getattr(tokens, token) for swatch, token in self.swatches.items()}
+        _write(item, self.text, getattr(tokens, self.token), inks)
+
+
+def _write(item: Any, text: str, text_colour: str, inks: Mapping[str, str] | None = None) -> None:
+    """Set the text of a label; a wide one is cut instead of moving the plot. `inks` colour characters."""
+    inked = {ord(char): f'<span style="color: {ink}">{char}</span>' for char, ink in (inks or {}).items()}
+    styled = f'<span style="color: {text_colour}; font-size: 12px">{markup(text).translate(inked)}</span>'
     if styled != item.text:  # to lay a text out takes as long as to draw a curve
         item.setText(styled)
         item.setMinimumWidth(0.0)

@@ -3,12 +3,13 @@
 from dataclasses import replace
 from typing import Any
 
+import pyqtgraph as pg
 import pytest
 from campaign_stage import ALL_SERIES, FOLDER, found, path_of, runs_with_a_mode
 from looking import clipped_words, visible_words
 from pointing import Hand
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QGuiApplication, QTextDocumentFragment
+from PySide6.QtGui import QGuiApplication, QTextDocument, QTextDocumentFragment
 from PySide6.QtWidgets import QApplication, QMenu, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker
@@ -116,6 +117,23 @@ def test_the_title_of_the_figure_shows_no_markup(stage: Stage) -> None:
     (plot,) = figure._stack.plots
     shown = QTextDocumentFragment.fromHtml(plot.title.text).toPlainText()
     assert shown.split() == ["friction", "by", "contact", "▨", "static", "fs", "■", "dynamic", "fd"]
+
+
+@pytest.mark.parametrize("scheme", [Qt.ColorScheme.Light, Qt.ColorScheme.Dark])
+def test_the_swatches_of_the_figure_have_the_colours_of_its_bars(
+    stage: Stage, theme: Theme, scheme: Qt.ColorScheme
+) -> None:
+    stage.gathered()
+    theme.fix(scheme)
+    (figure,) = stage.screen.findChildren(FrictionPlot)
+    (plot,) = figure._stack.plots
+    (bar,) = {item.opts["pen"].color().name() for item in figure._items if isinstance(item, pg.BarGraphItem)}
+    points = [item.opts for item in figure._items if isinstance(item, pg.ScatterPlotItem)]
+    (bound,) = {drawn["brush"].color().name() for drawn in points if drawn["symbol"] == "t1"}
+    document = QTextDocument()
+    document.setHtml(plot.title.text)
+    for swatch, ink in (("▨", bound), ("■", bar)):
+        assert document.find(swatch).charFormat().foreground().color().name() == ink
 
 
 def test_simulated_runs_are_named_and_chosen_by_a_switch(stage: Stage) -> None:

@@ -1,8 +1,8 @@
 """Place and size of the window are restored, as far as they fit the screen."""
 
 import pytest
-from PySide6.QtCore import QRect, Qt
-from PySide6.QtGui import QGuiApplication
+from PySide6.QtCore import QPoint, QRect, QSize, Qt
+from PySide6.QtGui import QGuiApplication, QScreen
 from PySide6.QtWidgets import QApplication, QMainWindow, QSplitter, QTableWidget, QWidget
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker, analysed
@@ -43,14 +43,24 @@ def test_a_window_of_a_screen_that_is_gone_comes_into_the_middle(window: QMainWi
     assert (window.width(), window.height()) == (500, 400)
 
 
-def test_a_window_is_no_larger_than_the_screen(window: QMainWindow) -> None:
-    WindowGeometry(WindowLayout(0, 0, 99_000, 99_000)).restore_window(window)
-    assert window.size() == free().size()
-
-
-def test_without_a_memory_it_has_its_usual_size(window: QMainWindow) -> None:
+@pytest.mark.parametrize(
+    ("room", "is_maximized"),
+    [
+        ((1920, 1040), False),
+        ((1280, 800), True),
+        ((1024, 640), True),
+        ((960, 540), True),
+        ((800, 600), False),
+    ],
+)
+def test_a_first_window_that_does_not_fit_with_its_frame_is_maximized(
+    window: QMainWindow, monkeypatch: pytest.MonkeyPatch, room: tuple[int, int], is_maximized: bool
+) -> None:
+    monkeypatch.setattr(QScreen, "availableGeometry", lambda _: QRect(QPoint(), QSize(*room)))
     WindowGeometry(WindowLayout()).restore_window(window)
-    assert (window.width(), window.height()) == (min(1280, free().width()), min(800, free().height()))
+    assert window.isMaximized() is is_maximized
+    inside = QSize(*room) - QSize(16, 39)
+    assert window.size().boundedTo(inside) == window.size(), "when it is maximized no more"
 
 
 def test_a_window_that_filled_the_screen_does_so_again(window: QMainWindow) -> None:
