@@ -4,6 +4,7 @@ import contextlib
 import errno
 import getpass
 import os
+import re
 import sys
 import tempfile
 from pathlib import Path
@@ -17,6 +18,20 @@ from config.schema import Settings
 
 TRASH = ".trash"  # folder beside runs that holds those moved to the trash
 RECORDINGS = "SLIPSTAND_RECORDINGS"  # variable that says where runs are kept, before all settings
+
+
+def next_run_number(folder: Path, stem: str) -> int:
+    """Number after that of the last run of a series in a folder.
+
+    `stem` is what stands before the number in a name: start and series, or the start alone of a run without
+    a series. A folder that cannot be listed has no runs.
+    """
+    _, has_series, series = stem.partition("_")
+    name = re.compile(rf"\d{{8}}T\d{{6}}{has_series}{re.escape(series)}_(\d{{3,5}})\.h5")
+    with contextlib.suppress(OSError):
+        found = [name.fullmatch(entry.name) for entry in folder.iterdir()]
+        return max((int(match[1]) for match in found if match), default=0) + 1
+    return 1
 
 
 def user_data_folder() -> Path:

@@ -29,6 +29,7 @@ from app.runs.fields import fill_fields
 from app.runs.journal import JournalRecord, JournalSpan, RecordKind, UnreadableJournalError, read_journal
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata, RunMetadata
+from app.runs.paths import next_run_number
 from app.runs.writer_client import ERRORS, Closed, Failed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand
 from config.durable_files import remove_file, replace_file, sync_folder
 from drivers.samples import Losses
@@ -45,11 +46,15 @@ def create_run_in(
     journal: JournalSpan | None = None,
     identifier: str = "",
 ) -> "RunWriter":
-    """Create a run under the next free name in `folder`: `20261121T143205_1FFM0_001.h5`. Raises RunError."""
+    """Create a run in `folder`, named by start, series and number: `20261121T143205_1FFM0_001.h5`.
+
+    Runs of a series are numbered in their order. Raises RunError.
+    """
     disk.make_folder(folder)
     began = metadata.format_start("%Y%m%dT%H%M%S")
     stem = f"{began}_{metadata.series}" if metadata.series else began
-    for number in range(1, _NAMES_MAX):
+    first = next_run_number(folder, stem)
+    for number in range(first, first + _NAMES_MAX):
         try:
             path = folder / f"{stem}_{number:03d}{schema.SUFFIX}"
             return create_run(path, metadata, layout, journal, identifier)

@@ -30,6 +30,7 @@ from app.runs.file_operations import (
 )
 from app.runs.journal import find_journals, has_record_behind
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
+from app.runs.paths import next_run_number
 from app.runs.schema import SUFFIX
 from config.durable_files import remove_file, sync_folder
 from messages.i18n import N_
@@ -137,7 +138,8 @@ def _recover(summary: JournalSummary, place: Path, progress: Progress) -> Recove
     _await_writer(summary, place)
     earlier = _earlier_file(summary, place)
     with _workshop(place, summary.path.stem) as folder:
-        made = folder / (earlier.name if earlier else f"{_stem(summary)}_001{SUFFIX}")
+        stem = _stem(summary)
+        made = folder / (earlier.name if earlier else f"{stem}_{next_run_number(place, stem):03d}{SUFFIX}")
         rebuilt = rebuild(summary, made, progress)
         if rebuilt is None:
             template = N_("{path} holds {bytes} bytes but no sample. Delete it if it is not needed")

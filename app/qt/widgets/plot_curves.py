@@ -40,6 +40,11 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
         if self.opts["fillLevel"] is not None:
             self.setBrush(self.opts["pen"].color())
 
+    def viewTransformChanged(self) -> None:  # noqa: N802
+        """As pyqtgraph, and forget what was in view, which it remembers for items."""
+        self._cachedView = None
+        super().viewTransformChanged()
+
     def boundingRect(self) -> QRectF:  # noqa: N802
         """All that is in view: pyqtgraph looks for the extremes of all points anew at each step of a zoom."""
         return QRectF(self.viewRect()) if len(self.xData) else QRectF()

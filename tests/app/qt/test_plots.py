@@ -393,3 +393,22 @@ def test_buttons_stand_in_the_plot_while_the_pointer_does(stack: PlotStack, qtbo
     menu.close()
     QApplication.sendEvent(stack, QEvent(QEvent.Type.Leave))
     assert not buttons["Zoom in"].isVisible()
+
+
+def test_a_curve_is_drawn_wherever_the_view_goes(theme: Theme, qtbot: QtBot) -> None:
+    stack = PlotStack(theme, [("one", "text")])
+    qtbot.addWidget(stack)
+    stack.resize(400, 300)
+    (plot,) = stack.plots
+    curve = plot.curve(antialias=False)
+    curve.setPen(pen("#ff0000"))
+    stack.show()
+    for start in (0.0, 100.0, -3000.0):
+        x = np.linspace(start, start + 10.0, 50)
+        curve.show_points(x, x)
+        plot.set_value_range(start, start + 10.0)
+        stack.set_time_range(start, start + 10.0)
+        QApplication.processEvents()
+        image = stack.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+        inks = np.frombuffer(image.constBits(), np.uint32) & 0xFFFFFF
+        assert np.count_nonzero(inks == 0xFF0000) > 100

@@ -24,6 +24,23 @@ def test_names_say_when_and_what_and_count_up(tmp_path, metadata):
     assert names == ["20261121T143205_1FFM1_001.h5", "20261121T143205_1FFM1_002.h5", "20261121T143205_001.h5"]
 
 
+def test_runs_of_a_series_are_numbered_in_their_order(tmp_path, metadata):
+    for name in (
+        "20261121T143100_1FFM1_001.h5",
+        "20261121T143150_1FFM1_007.h5",
+        "20261121T143200_1FFM0_009.h5",
+    ):
+        (tmp_path / name).touch()
+    (tmp_path / "20261121T143202_011.h5").touch()
+    (tmp_path / "my 1FFM1_800.h5").touch()
+    names = []
+    for described in (metadata, metadata.replace(series=None), metadata.replace(series="1FFM2")):
+        writer = create_run_in(tmp_path, described)
+        names.append(writer.path.name)
+        writer.close(ENDING)
+    assert names == ["20261121T143205_1FFM1_008.h5", "20261121T143205_012.h5", "20261121T143205_1FFM2_001.h5"]
+
+
 def test_nothing_is_ever_overwritten(tmp_path, metadata):
     path = tmp_path / "run.h5"
     path.write_bytes(b"precious")
