@@ -20,6 +20,10 @@ _SMALL_M = 0.9995e-3  # three digits of it are still less than 1000 µm
 _LARGE_M = 0.5
 _FIXED_POINT = 1e-5, 1e9  # sizes that are written without an exponent
 _HYPHEN_OF_NUMBER = re.compile(r"(?<![^\s(])-(?=\d)")  # a minus sign, no hyphen of a name
+_UNITS = "°C|[mµn]?m|[mµn]?s|min|k?g|[kM]?N|[kM]?Hz|rad|[kMG]B|мк?м|мк?с|с|мин|к?г|к?Н|[км]?Гц|рад"
+_INSIDE_VALUE = re.compile(
+    rf"(?<=\d) (?=±|%|(?:{_UNITS})\b)|(?<=±) (?=\d)|(?<=\bp) (?=[=<>])|(?<=\bp [=<>]) (?=\d)"
+)
 _PREFIXES = ("", "m", "µ", "n", "p")
 
 
@@ -155,6 +159,11 @@ def typeset(text: str) -> str:
 def typeset_sentence(text: str) -> str:
     """Put true minus signs before the numbers of a sentence; hyphens of words stay."""
     return _HYPHEN_OF_NUMBER.sub(MINUS, text)
+
+
+def unbreakable(text: str) -> str:
+    """Let no line of a sentence end before ±, %, or a unit, or after ±."""
+    return _INSIDE_VALUE.sub(NO_BREAK_SPACE, text)
 
 
 def _significant(value: float, digits: int) -> str:

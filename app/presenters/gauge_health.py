@@ -6,7 +6,7 @@ from typing import Final
 import numpy as np
 
 from analysis.catalogue import MICROMETRE
-from analysis.formatting import MINUS, with_unit
+from analysis.formatting import MINUS, format_value, with_unit
 from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, diagnose, worst_grade
 from app.presenters.base import LabelledValue
 from app.presenters.number_text import format_displacement, format_fixed
@@ -45,21 +45,21 @@ def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:
         name,
         worst_grade(symptoms),
         tuple(SymptomText(s.code, s.grade, translate(s.message), translate(s.remedy)) for s in symptoms),
-        _figures(health),
+        _figures(health, is_moving=any(symptom.code == "moves" for symptom in symptoms)),
         health.spectrum.frequency_hz,
         health.spectrum.density_m_per_sqrt_hz * 1e6,
     )
 
 
-def _figures(health: GaugeHealth) -> tuple[LabelledValue, ...]:
+def _figures(health: GaugeHealth, *, is_moving: bool) -> tuple[LabelledValue, ...]:
     used = health.range_fraction
-    drift = format_fixed(health.drift_m_per_min * 1e6, 1)
-    uncertainty = format_fixed(health.drift_standard_uncertainty_m_per_min * 1e6, 1)
+    drift_uncertainty = 1e6 * health.drift_standard_uncertainty_m_per_min
+    drift = format_value(1e6 * health.drift_m_per_min, drift_uncertainty, "µm/min").in_print
     hums = {gettext("hum, {frequency:g} Hz", frequency=hum.frequency_hz): _hum(hum) for hum in health.hum}
     figures = {
         gettext("reading"): format_displacement(health.mean_m, 3),
-        gettext("noise, rms"): _micrometres(health.noise_rms_m),
-        gettext("drift"): with_unit(f"{drift} ± {uncertainty}", "µm/min"),
+        gettext("noise, rms"): MINUS if is_moving else _micrometres(health.noise_rms_m),
+        gettext("drift"): MINUS if is_moving else drift,
         **hums,
         gettext("range used"): MINUS if used is None else _percent(used, 0),
         gettext("converter step"): _micrometres(health.resolution_m),

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from analysis.formatting import (
+    NO_BREAK_SPACE,
     format_interval,
     format_length,
     format_number,
     format_uncertainty,
     format_value,
     format_with_unit,
+    unbreakable,
 )
 from analysis.identify import identify
 from analysis.motion.one_mass import OneMassDecay, simulate
@@ -148,3 +150,17 @@ def test_times_that_go_back_are_told_apart_however_late_they_are() -> None:
 
     with pytest.raises(RecordError, match=r"row 50: 1700000000\.049\d* s, then 1700000000\.048\d* s"):
         identify(Record(time_s, np.zeros(100), None, StandMasses(131.6, 22.4)))
+
+
+@pytest.mark.parametrize(
+    ("text", "unbroken"),
+    [
+        ("by 0.9975 ± 0.0029 s/m: clean it", "by 0.9975~±~0.0029~s/m: clean it"),
+        ("from −25.052 % to −24.9 %", "from −25.052~% to −24.9~%"),
+        ("p = 0.59 at 6 mm, in 3 series", "p~=~0.59 at 6~mm, in 3 series"),
+        ("на 6 мм за 5 мс", "на 6~мм за 5~мс"),
+        ("run 1 of 3 more", "run 1 of 3 more"),
+    ],
+)
+def test_no_line_of_a_sentence_ends_inside_a_value(text: str, unbroken: str) -> None:
+    assert unbreakable(text) == unbroken.replace("~", NO_BREAK_SPACE)

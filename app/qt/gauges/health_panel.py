@@ -23,10 +23,12 @@ from messages.i18n import N_, gettext
 
 _SYMPTOMS_SHOWN = 3
 _TITLE = N_("noise, µm/√Hz &nbsp; — gauge 1 &nbsp; - - gauge 2")
+_SWATCHES = {"—": "channel_1", "- -": "channel_2"}
 _FREQUENCY = N_("frequency, Hz")
 _DASHES = (6.0, 3.0)
-_SHORT, _EVEN = 0.7, 4
-"""Decades that hold two marks at least, and number of even marks."""
+_STEPS = (1, 2, 5)
+_SHORT, _FEWEST = 1.3, 3
+"""Decades that hold three marks at least, and that number."""
 _VERDICTS = {HealthGrade.GOOD: N_("Good"), HealthGrade.DOUBTFUL: N_("Doubtful"), HealthGrade.BAD: N_("Bad")}
 
 
@@ -97,11 +99,14 @@ def _chip(grade: HealthGrade, words: str) -> Chip:
 
 
 def _ticks(low: float, high: float) -> list[tuple[float, str]]:
-    """Marks at 1, 2, 5 and their powers of ten, on an axis of logarithms; even ones on a short part of it."""
+    """Marks at 1, 2, 5 and their powers of ten, on an axis of logarithms; on a short part of it even ones."""
     decades = range(math.floor(low), math.ceil(high) + 1)
-    values = [step * 10.0**decade for decade in decades for step in (1, 2, 5)]
+    values = [step * 10.0**decade for decade in decades for step in _STEPS]
     if high - low < _SHORT:
-        values = np.linspace(10.0**low, 10.0**high, _EVEN + 2)[1:-1].tolist()
+        span = 10.0**high - 10.0**low
+        size = 10.0 ** math.floor(math.log10(span / _FEWEST))
+        step = max(size * step for step in _STEPS if size * step <= span / _FEWEST)
+        values = [step * number for number in range(1, math.ceil(10.0**high / step) + 1)]
     return [(math.log10(value), f"{value:.4g}") for value in values if low <= math.log10(value) <= high]
 
 
@@ -109,7 +114,7 @@ class Spectrum(PlotStack):
     """Amplitude density of both gauges over the frequency, both axes logarithmic."""
 
     def __init__(self, theme: Theme) -> None:
-        super().__init__(theme, ((gettext(_TITLE), "text"),), format_point=_format_point)
+        super().__init__(theme, (("", "text"),), format_point=_format_point)
         (plot,) = self.plots
         self._curves = [plot.curve() for _ in range(2)]
         self.table = self._table
@@ -148,6 +153,7 @@ class Spectrum(PlotStack):
 
     def _recolour(self) -> None:
         self.restyle()
+        self.set_title(0, gettext(_TITLE), _SWATCHES)
         self.set_time_title(gettext(_FREQUENCY))
         tokens = self._theme.tokens
         self._curves[0].setPen(pen(tokens.channel_1))

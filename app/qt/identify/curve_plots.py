@@ -24,6 +24,7 @@ _NAMES = (
 )
 _COLOURS = ("channel_1", "channel_2", "text")
 _KEY = N_("— record &nbsp; - - simulation")
+_SWATCHES = {"- -": "simulation"}
 _RECORD_ONLY = N_("— record; no motion was fitted")
 _OF_RESIDUAL = N_("table and relative; between the dashes: twice the noise")
 _OF_TABLE = N_("table; between the dashes: twice the noise")
@@ -127,7 +128,7 @@ class CurvePlots(QWidget):
             texts = (f"{texts[0]} &nbsp; {gettext(_UNUSED)}", *texts[1:])
         shown = (True, relative is not None, is_fitted)
         for row, (name, unit, text) in enumerate(zip(_NAMES, _units(curves), texts, strict=True)):
-            self._stack.set_title(row, f"{gettext(name, unit=unit.symbol)} &nbsp; {text}")
+            self._stack.set_title(row, f"{gettext(name, unit=unit.symbol)} &nbsp; {text}", _SWATCHES)
             self._stack.set_plot_visible(row, shown=shown[row])
 
     def _name_curves(self, curves: Curves) -> None:

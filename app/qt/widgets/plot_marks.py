@@ -46,9 +46,9 @@ def vertical_line(plot: "Plot") -> Any:
 
 
 def draggable_line(plot: "Plot") -> Any:
-    """Add a vertical line with a grip that the mouse can drag."""
+    """Add a vertical line that the mouse can drag, with a grip that looks like no point of a curve."""
     line = pg.InfiniteLine(angle=90, movable=True)
-    line.addMarker("o", position=0.5, size=14.0)
+    line.addMarker("<|>", position=0.5, size=16.0)
     line.setZValue(20)
     return plot.add(line)
 

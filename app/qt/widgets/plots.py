@@ -185,7 +185,7 @@ class PlotStack(QFrame):
         self.set_time_title(self._time_title)
 
     def set_title(self, row: int, text: str, swatches: Mapping[str, str] | None = None) -> None:
-        """Write a title; each of `swatches`, one character in it, has the colour token given for it."""
+        """Write a title; each of `swatches`, characters in it, has the colour token given for it."""
         self._titles[row] = replace(self._titles[row], text=text, swatches=swatches or {})
         self._titles[row].write(self.plots[row].title, self._theme.tokens)
 
@@ -385,7 +385,7 @@ def value_extent(*lines: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class _Title:
-    """Rich text, its colour token, and the tokens of single characters in it that have another colour."""
+    """Rich text, its colour token, and the tokens of characters in it that have another colour."""
 
     text: str
     token: str
@@ -398,8 +398,10 @@ class _Title:
 
 def _write(item: Any, text: str, text_colour: str, inks: Mapping[str, str] | None = None) -> None:
     """Set the text of a label; a wide one is cut instead of moving the plot. `inks` colour characters."""
-    inked = {ord(char): f'<span style="color: {ink}">{char}</span>' for char, ink in (inks or {}).items()}
-    styled = f'<span style="color: {text_colour}; font-size: 12px">{markup(text).translate(inked)}</span>'
+    inked = markup(text)
+    for swatch, ink in (inks or {}).items():
+        inked = inked.replace(swatch, f'<span style="color: {ink}">{swatch}</span>')
+    styled = f'<span style="color: {text_colour}; font-size: 12px">{inked}</span>'
     if styled != item.text:  # to lay a text out takes as long as to draw a curve
         item.setText(styled)
         item.setMinimumWidth(0.0)

@@ -1,5 +1,6 @@
 """Keyboard shortcuts: their description is in the tool tip of the button and in the help dialog."""
 
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -81,7 +82,9 @@ def list_shortcuts(widget: QWidget, *, own: bool = False) -> list[ShortcutHelp]:
 
 
 def _native(keys: str) -> str:
-    return QKeySequence(keys).toString(QKeySequence.SequenceFormat.NativeText)
+    """Name of a key as this system has it; on a Mac it is a symbol, elsewhere Return is marked Enter."""
+    marked = keys if sys.platform == "darwin" else keys.replace("Return", "Enter")
+    return QKeySequence(marked).toString(QKeySequence.SequenceFormat.NativeText)
 
 
 class HelpDialog(QDialog):

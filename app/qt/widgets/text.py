@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from analysis.formatting import unbreakable
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Tone
 from app.presenters.results import ResultRow
 from app.qt.theme import TextRole, font, set_property
@@ -50,7 +51,8 @@ class Label(QLabel):
         self._text = text
         is_rich = _MARKUP.search(text) is not None
         self.setTextFormat(Qt.TextFormat.RichText if is_rich else Qt.TextFormat.PlainText)
-        super().setText(markup(text) if is_rich else show_control_characters(text))
+        unbroken = unbreakable(text)
+        super().setText(markup(unbroken) if is_rich else show_control_characters(unbroken))
 
     def set_rich_text(self, rich: str) -> None:
         """Show HTML; what is foreign in it must be escaped."""

@@ -45,3 +45,22 @@ def test_a_dead_gauge_says_what_to_do() -> None:
 def test_both_gauges_have_the_same_lines() -> None:
     labels = [[one.label for one in shown(x).figures] for x in (NOISE, np.zeros(5000))]
     assert labels[0] == labels[1]
+
+
+def test_of_a_moving_table_no_noise_and_no_drift_are_told() -> None:
+    swing = 1e-3 * np.sin(2.0 * np.pi * 3.0 * np.arange(5000) / 1000.0)
+    state = shown(swing + NOISE)
+    figures = {one.label: one.value for one in state.figures}
+    assert [one.code for one in state.symptoms] == ["moves"]
+    assert figures["noise, rms"] == figures["drift"] == "−"
+
+
+def test_a_drift_has_two_digits_of_its_uncertainty() -> None:
+    rise = 40e-6 / 60.0 * np.arange(5000) / 1000.0
+    figures = {one.label: one.value for one in shown(rise + NOISE).figures}
+    value, _, rest = figures["drift"].replace("\u00a0", " ").partition(" ± ")
+    uncertainty, unit = rest.split(" ")
+    assert unit == "µm/min"
+    assert len(uncertainty.replace(".", "").lstrip("0")) == 2
+    assert len(value.partition(".")[2]) == len(uncertainty.partition(".")[2])
+    assert abs(float(value) - 40.0) < 4.0 * float(uncertainty)

@@ -1,6 +1,7 @@
 """The Gauges screen: cards and tabs follow the state; keys and clicks reach the presenter."""
 
 import datetime
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from operator import attrgetter
@@ -29,6 +30,7 @@ from app.presenters.gauges.state import (
     PortCard,
 )
 from app.presenters.navigator import ConnectForm
+from app.qt.gauges.health_panel import _ticks
 from app.qt.gauges.screen import GaugesScreen
 from app.qt.theme import Theme
 from app.qt.widgets.plots import PlotStack
@@ -166,6 +168,16 @@ def test_the_spectrum_is_zoomed_with_numbers_at_its_axes_and_saved_in_its_units(
     (one, _) = spectrum.table()
     assert (one.x_title, one.title) == ("frequency, Hz", "gauge 1, noise, µm/√Hz")
     assert 10.0**low <= one.x[0] < one.x[-1] <= 10.0**high
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.42, 1.24), (0.9, 21.0), (0.031, 0.044), (3.0, 800.0)])
+def test_an_axis_of_logarithms_has_round_numbers(low: float, high: float) -> None:
+    marks = _ticks(math.log10(low), math.log10(high))
+    assert len(marks) >= 3
+    for place, text in marks:
+        assert len(text.replace("0", "").replace(".", "")) <= 2, text
+        assert low <= 10.0**place <= high * (1.0 + 1e-9)
+        assert float(text) == pytest.approx(10.0**place)
 
 
 def test_keys_reach_every_tab_and_the_ports(stage: Stage) -> None:

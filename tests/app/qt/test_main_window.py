@@ -199,6 +199,7 @@ def test_f1_lists_the_keys_of_the_screen_and_of_the_window(desk: Desk) -> None:
     assert clipped_words(shown) == []
     for expected in ("On Runs", "Ctrl+E", "Everywhere", "Ctrl+,\nSettings", "F1"):
         assert expected in words, words
+    assert "Return" not in words, "the key is marked Enter"
     assert not shown.isModal()
     shown.close()
 

@@ -19,12 +19,17 @@ import pytest
 from app.__main__ import main
 
 OLD_RUNS = Path(__file__).resolve().parents[2] / "golden" / "old_runs"
+ROUNDING = 1e-14
+"""What the order of a summation, which a processor chooses, leaves of a record without noise."""
 RELATIVE_DIFFERENCE = 1e-9
 """Between processors and builds of LAPACK; the same machine gives the same bits."""
 LINE_DIFFERENCE = 1e-8
 """Of the result's standard uncertainty, by which a line of its budget may differ."""
-DRAWN = {"slip_end_uncertainty_s": 1e-3}
-"""Relative differences of what is counted over drawn parameters: rounding moves where a single draw ends."""
+DRAWN = {"slip_end_uncertainty_s": 0.05}
+"""Relative differences of what is counted over drawn parameters: rounding moves where a single draw ends.
+
+Without noise it is 70 ns, and a processor without AVX-512 gives 3.6 % more.
+"""
 
 _UNSTATED = ("gain-not-stated", "clock-not-timed")
 _LATER_WARNINGS = {
@@ -79,7 +84,7 @@ def assert_same(now: Any, then: Any, where: str, relative: float = RELATIVE_DIFF
         for number, (one, other) in enumerate(zip(now, then, strict=True)):
             assert_same(one, other, f"{where}[{number}]")
     elif isinstance(then, float):
-        assert now == pytest.approx(then, rel=relative, abs=1e-14, nan_ok=True), where
+        assert now == pytest.approx(then, rel=relative, abs=ROUNDING, nan_ok=True), where
     else:
         assert now == then, where
 
@@ -104,7 +109,7 @@ def take_budget(now: Any, then: Any) -> None:
             assert one["standard_uncertainty"] is None, place
             continue
         off = abs(one["standard_uncertainty"] - other["standard_uncertainty"])
-        assert off <= max(LINE_DIFFERENCE * scale, 1e-14), place
+        assert off <= max(LINE_DIFFERENCE * scale, ROUNDING), place
         one |= {key: value for key, value in other.items() if isinstance(value, float)}
 
 
@@ -119,12 +124,15 @@ def assert_wider_breakaway(now: Any, then: Any) -> None:
     if (then["model"] or {}).get("name") not in ("coulomb", "coulomb+tilt"):
         return
     wider, narrow = (document["results"][_BREAKAWAY] for document in (now, then))
-    least = 1.0 - RELATIVE_DIFFERENCE
-    assert wider["standard_uncertainty"] >= least * narrow["standard_uncertainty"], then["run"]
+
+    def is_no_less(one: float, other: float) -> bool:
+        return one >= (1.0 - RELATIVE_DIFFERENCE) * other - ROUNDING
+
+    assert is_no_less(wider["standard_uncertainty"], narrow["standard_uncertainty"]), then["run"]
     now["results"][_BREAKAWAY] = {**narrow, "value": wider["value"]}
     for one, other in zip(now["budget"], then["budget"], strict=True):
         if (one["contribution_to"], one["source"]) == (_BREAKAWAY, "noise"):
-            assert one["standard_uncertainty"] >= least * other["standard_uncertainty"], then["run"]
+            assert is_no_less(one["standard_uncertainty"], other["standard_uncertainty"]), then["run"]
             one["standard_uncertainty"] = other["standard_uncertainty"]
 
 
