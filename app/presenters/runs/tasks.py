@@ -140,7 +140,7 @@ def preview_export(path: str, choice: dict[str, Any]) -> str:
 
 
 def _first_lines(path: Path) -> str:
-    size = f"{path.stat().st_size / 1e3:,.0f} kB"
+    size = with_unit(f"{path.stat().st_size / 1e3:.0f}", "kB")
     if path.suffix not in _TEXT_SUFFIXES:
         return f"{path.name}, {size}"
     with path.open(encoding="utf-8", errors="replace") as file:
