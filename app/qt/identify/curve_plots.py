@@ -49,6 +49,7 @@ class CurvePlots(QWidget):
         super().__init__()
         self._theme = theme
         self._curves: Curves | None = None
+        self._has_grown = False
         self._stack = PlotStack(theme, [("", colour) for colour in _COLOURS], heights=(3, 3, 2))
         table, relative, residual = self._stack.plots
         self._records = [plot.line() for plot in (table, relative)]
@@ -78,20 +79,16 @@ class CurvePlots(QWidget):
             self._records[row].show_line(curves.time_s, channel.record if channel else None)
             self._simulations[row].show_line(curves.time_s, channel.simulation if channel else None)
             self._residuals[row].show_line(curves.time_s, channel.residual if channel else None)
-        self.show_manual_fit(None)
-        *gauges, of_residual = zip(self._stack.plots, _lines(curves), strict=True)
-        for plot, lines in gauges:
+        for plot, lines in zip(self._stack.plots[:2], _lines(curves), strict=False):
             plot.fit_values(*lines, keep=keep)
-        start_s, end_s = curves.fitted
-        fitted = (curves.time_s >= start_s) & (curves.time_s <= end_s)
-        plot, lines = of_residual
-        plot.fit_values(*lines, shown=fitted, keep=keep)
+        self._fit_residuals(keep=keep)
+        self.show_manual_fit(None)
         self._set_titles(curves)
         self._name_curves(curves)
         for slip in self._slips:
             slip.show_spans(curves.slips)
         for unused in self._unused:
-            unused.show_spans(((end_s, math.inf),) if curves.fit_ends_early else ())
+            unused.show_spans(((curves.fitted[1], math.inf),) if curves.fit_ends_early else ())
         band = 2.0 * (curves.noise or 0.0)
         place_region(self._noise, (-band, band) if band else None)
         first_s, last_s = float(curves.time_s[0]), float(curves.time_s[-1])
@@ -107,6 +104,20 @@ class CurvePlots(QWidget):
         for curves, lines in ((self._hand_simulations, simulated), (self._hand_residuals, left_over)):
             for row, curve in enumerate(curves):
                 _set_line(curve, lines[row] if row < len(lines) else None)
+        if left_over:  # the range only grows, so that it does not jump under a drag
+            self._stack.plots[-1].grow_values(*(line.values for line in left_over))
+            self._has_grown = True
+        elif self._has_grown:
+            self._fit_residuals(keep=True)
+
+    def _fit_residuals(self, *, keep: bool) -> None:
+        """Show the residuals of what was fitted; a reset shows no more, zooming out all of them."""
+        self._has_grown = False
+        if self._curves is not None:
+            start_s, end_s = self._curves.fitted
+            fitted = (self._curves.time_s >= start_s) & (self._curves.time_s <= end_s)
+            *_, lines = _lines(self._curves)
+            self._stack.plots[-1].fit_values(*lines, shown=fitted, keep=keep)
 
     def span(self) -> tuple[float, float]:
         """What of the time axis is drawn (s)."""

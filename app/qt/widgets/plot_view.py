@@ -59,6 +59,14 @@ class PlotView(pg.ViewBox):  # type: ignore[misc]  # pyqtgraph has no types
         if not stays:
             self.show_home(axis)
 
+    def grow_home(self, axis: int, span: Span) -> None:
+        """Widen what a reset shows of an axis, and its limits, to hold a span; a range that was chosen stays."""
+        (low, high), name = self._home[axis], "xy"[axis]
+        grown = min(low, span[0]), max(high, span[1])
+        if grown != (low, high):
+            least, most = self.state["limits"][f"{name}Limits"]
+            self.set_home(axis, grown, (min(least, grown[0]), max(most, grown[1])), keep=True)
+
     def show_home(self, axis: int) -> None:
         self.show_ranges({axis: self._home[axis]})
 

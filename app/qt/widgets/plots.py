@@ -94,6 +94,10 @@ class Plot:
         home = limits if shown is None else value_extent(*(line[shown] for line in lines))
         self.view.set_home(Y, home, limits, keep=keep)
 
+    def grow_values(self, *lines: Floats) -> None:
+        """Make the range that a reset shows so large that lines fit into it."""
+        self.view.grow_home(Y, value_extent(*lines))
+
     def autoscale(self) -> None:
         """Fit the height to what is in view."""
         values = [curve.y for curve in self.curves_in_view("")]

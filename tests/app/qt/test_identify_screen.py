@@ -242,6 +242,22 @@ def test_the_handle_asks_for_one_simulation_at_a_time_and_ends_at_the_newest(sta
     assert not stage.curves._simulations[0].isVisible()
 
 
+def test_residuals_by_hand_are_in_view_until_the_handle_goes_back(stage: Stage) -> None:
+    stage.presenter.on_opening(RUN)
+    stage.presenter.on_analysed(with_scan())
+    residual = stage.curves._stack.plots[-1]
+    of_fit = residual.view.viewRange()[1]
+    stage.screen._scan.friction_set.emit(0.104)
+    answer(stage)  # residuals of 104 µm
+    by_hand = residual.view.viewRange()[1]
+    assert of_fit[1] < 104.0 < by_hand[1]
+    stage.screen._scan.friction_set.emit(0.1001)
+    answer(stage)
+    assert residual.view.viewRange()[1] == by_hand, "it does not jump under a drag"
+    stage.screen._scan.reset_requested.emit()
+    assert residual.view.viewRange()[1] == pytest.approx(of_fit)
+
+
 def test_keys_move_the_handle_and_take_it_back(stage: Stage, qtbot: QtBot) -> None:
     stage.presenter.on_opening(RUN)
     stage.presenter.on_analysed(with_scan())
