@@ -60,7 +60,7 @@ class PlotView(pg.ViewBox):  # type: ignore[misc]  # pyqtgraph has no types
             self.show_home(axis)
 
     def grow_home(self, axis: int, span: Span) -> None:
-        """Widen what a reset shows of an axis, and its limits, to hold a span; a range that was chosen stays."""
+        """Widen what a reset shows of an axis, and its limits, to hold a span; a chosen range stays."""
         (low, high), name = self._home[axis], "xy"[axis]
         grown = min(low, span[0]), max(high, span[1])
         if grown != (low, high):
