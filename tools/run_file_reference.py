@@ -75,8 +75,8 @@ def reference() -> str:
             *_fields(schema.ANALYSIS_FIELDS),
             "\nThe groups `results`, `model`, `tried`, `budget`, `events` and `warnings` beside them repeat"
             "\nparts of `document` for other programs; this one reads `document`. An analysis whose texts"
-            "\ndiffer from their checksum, or whose groups hold anything but what `document` says, is reported"
-            "\nas damaged and not used. Files of earlier versions without the checksum are checked by their"
+            "\ndiffer from their checksum, or whose groups hold anything but what `document` says, is"
+            "\nreported as damaged and not used. Files of earlier versions without it are checked by their"
             "\ngroups alone.",
             "",
         ]

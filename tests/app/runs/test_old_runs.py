@@ -25,8 +25,8 @@ LINE_DIFFERENCE = 1e-8
 """Of the result's standard uncertainty, by which a line of its budget may differ."""
 ROUNDING = 1e-14
 """By which a line of a budget may differ where it is the rounding of a sum, as of a run without noise."""
-DRAWN = {"slip_end_uncertainty_s": 1e-3}
-"""Relative differences of what is counted over drawn parameters: rounding moves where a single draw ends."""
+DRAWN = {"slip_end_uncertainty_s": (1e-3, 1e-8)}
+"""Relative and absolute differences of what is counted over drawn parameters: rounding moves single draws."""
 
 _UNSTATED = ("gain-not-stated", "clock-not-timed")
 _LATER_WARNINGS = {
@@ -69,19 +69,21 @@ def printed(
     return documents
 
 
-def assert_same(now: Any, then: Any, where: str, relative: float = RELATIVE_DIFFERENCE) -> None:
+def assert_same(
+    now: Any, then: Any, where: str, relative: float = RELATIVE_DIFFERENCE, absolute: float = ROUNDING
+) -> None:
     """Compare everything that the earlier version printed; new keys may have come, sentences may differ."""
     if isinstance(then, dict):
         for key, value in then.items():
             if key not in ("message", "source"):
                 assert key in now, f"{where}.{key}"
-                assert_same(now[key], value, f"{where}.{key}", DRAWN.get(key, RELATIVE_DIFFERENCE))
+                assert_same(now[key], value, f"{where}.{key}", *DRAWN.get(key, ()))
     elif isinstance(then, list):
         assert len(now) == len(then), where
         for number, (one, other) in enumerate(zip(now, then, strict=True)):
             assert_same(one, other, f"{where}[{number}]")
     elif isinstance(then, float):
-        assert now == pytest.approx(then, rel=relative, abs=1e-14, nan_ok=True), where
+        assert now == pytest.approx(then, rel=relative, abs=absolute, nan_ok=True), where
     else:
         assert now == then, where
 
