@@ -21,6 +21,7 @@ from analysis.formatting import (
     format_fixed,
     format_interval,
     format_uncertainty,
+    format_value,
     typeset,
     typeset_sentence,
     uncertainty_decimals,
@@ -143,9 +144,6 @@ def _test(analysis: Analysis) -> blocks.Facts:
     run, metadata = analysis.run, analysis.run.metadata
     ending, events = run.end, analysis.identification.events
     device = metadata.device
-    slip_s = None
-    if events.release_s is not None and events.slip_end_s is not None:
-        slip_s = events.slip_end_s - events.release_s
     rows = [
         ("run", run.path.name),
         ("title", metadata.title),
@@ -163,11 +161,17 @@ def _test(analysis: Analysis) -> blocks.Facts:
         ("source", metadata.origin),
         ("ended", "" if ending is None else _ENDINGS.get(ending.ended, ending.ended)),
         ("hold before release", "" if ending is None else shared.in_unit(ending.dwell_s, SECOND, 2)),
-        ("slip lasted", shared.in_unit(slip_s, SECOND, 3)),
+        ("released at", _time(events.release_s, events.release_uncertainty_s)),
+        ("slip ended at", _time(events.slip_end_s, events.slip_end_uncertainty_s)),
         ("samples", _samples(run.losses)),
         ("note", metadata.note),
     ]
     return shared.without_empty(rows)
+
+
+def _time(time_s: float | None, uncertainty_s: float | None) -> str:
+    """A time of the record with its standard uncertainty; "" for None."""
+    return "" if time_s is None else format_value(time_s, uncertainty_s, SECOND.symbol).in_print
 
 
 def _samples(losses: Losses) -> str:
