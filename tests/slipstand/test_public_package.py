@@ -102,6 +102,10 @@ def test_a_run_gives_what_the_command_line_gives(tmp_path, slipstand) -> None:
     path = tmp_path / "run.h5"
     slipstand("simulate", "--series", "2SSM1", "-o", path)
     (by_command,) = slipstand("analyze", path, "--json").json
+    of_run = api.identify(api.read_run(path))
+    assert str(of_run).startswith("SIMULATED: ")
+    assert "<b>SIMULATED: " in of_run._repr_html_()
+    assert "<b>SIMULATED: " in api.pool(path)._repr_html_()
     run = api.read_run(path)
     result = api.identify(run)
     assert result.document["results"] == by_command["results"]

@@ -37,7 +37,7 @@ from app.reports.test_report import blocks, shared
 from app.reports.test_report.blocks import Cell, Section, Text
 from app.runs.analyze import Analysis
 from app.runs.metadata import Conditions, RunMetadata
-from app.runs.origin import SIMULATED, is_simulated, origin_rows
+from app.runs.origin import SIMULATED_RUN, is_simulated, origin_rows
 from app.runs.reader import Fingerprint
 from drivers.samples import Losses
 
@@ -89,7 +89,7 @@ def run_sections(
 def _notices(analysis: Analysis, excluded: str) -> Iterator[blocks.Block]:
     """Notices above the result: that it is simulated, an exclusion, and an expired calibration."""
     if is_simulated(analysis.document["origin"]):
-        yield blocks.Notice(f"{SIMULATED}: this run is of a simulated stand, not of a real one.")
+        yield blocks.Notice(f"{SIMULATED_RUN}.")
     if excluded:
         left_out = f"This run is left out of the campaign's results: {excluded}."
         yield blocks.Notice(f"{left_out} What follows is for information only.")
