@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, ClassVar, Self, TypeAlias
 
+from analysis.formatting import format_value
 from messages.i18n import N_
 from messages.message import Message, message
 
@@ -26,6 +27,10 @@ class Quantity:
         """Quantity with a normal distribution: 95 % lie within 1.959964 standard uncertainties."""
         half = COVERAGE_FACTOR_95 * standard_uncertainty
         return cls(value, standard_uncertainty, (value - half, value + half), unit)
+
+    def __str__(self) -> str:
+        """Value and standard uncertainty, rounded to two digits of it, in `unit`."""
+        return str(format_value(self.value, self.standard_uncertainty, "" if self.unit == "1" else self.unit))
 
     @property
     def expanded_uncertainty(self) -> float:

@@ -155,11 +155,14 @@ class Record:
         table_mass_kg: float,
         plate_mass_kg: float,
         gain_uncertainties: tuple[float | None, float | None] = (None, None),
+        clock_uncertainty: float | None = None,
     ) -> Self:
         """Record of arrays of equal length (n,); NaN stands for an absent reading.
 
-        `gain_uncertainties` are the relative standard uncertainties of both gauges' gains; None is "not
-        stated", which an identification warns of. All other fields are set by `replace`. Raises RecordError.
+        `gain_uncertainties` are the relative standard uncertainties of both gauges' gains, and
+        `clock_uncertainty` is that of the rate of the clock; None is "not stated", which an identification
+        warns of. Masses count as exact unless `replace(masses=StandMasses(...))` states their uncertainties.
+        All other fields are set by `replace`, too. Raises RecordError.
         """
         channels = {"time_s": time_s, "table_displacement_m": table_displacement_m}
         if relative_displacement_m is not None:
@@ -182,6 +185,8 @@ class Record:
             arrays["table_displacement_m"],
             arrays.get("relative_displacement_m"),
             StandMasses(float(table_mass_kg), float(plate_mass_kg)),
+            clock_scale_uncertainty=clock_uncertainty or 0.0,
+            clock_is_timed=clock_uncertainty is not None,
             table_gauge=GaugeUncertainty(gain_relative=gain_uncertainties[0]),
             relative_gauge=GaugeUncertainty(gain_relative=gain_uncertainties[1]),
         )

@@ -65,7 +65,9 @@ class PooledSeries:
             f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row_cells(row))}</tr>"
             for row in self.campaign.rows
         )
-        return f"<table><tr>{head}</tr>{rows}</table>"
+        warning = self.content.origin.warning
+        above = f"<p><b>{escape(warning)}</b></p>" if warning else ""
+        return f"{above}<table><tr>{head}</tr>{rows}</table>"
 
 
 def pool(paths: str | PathLike[str] | Iterable[str | PathLike[str]]) -> PooledSeries:

@@ -18,6 +18,7 @@ from analysis.verdict_text import describe_verdict
 from app.runs.analysis_json import unstated_warnings
 from app.runs.analysis_request import AnalysisRequest
 from app.runs.analyze import analyze_run
+from app.runs.origin import SIMULATED_RUN, is_simulated
 from app.runs.saved_analyses import analysis_document
 from drivers.samples import Losses
 from slipstand.runs import Run
@@ -55,6 +56,11 @@ class Result(Mapping[str, Quantity]):
     def kind(self) -> str:
         """`two-mass` or `one-mass`."""
         return self.identification.kind
+
+    @property
+    def is_simulated(self) -> bool:
+        """Whether the run is of a simulated stand; false of arrays, of which nothing is known."""
+        return is_simulated(self.document.get("origin", {}))
 
     @property
     def labels(self) -> dict[str, str | bool]:
@@ -151,8 +157,9 @@ class Result(Mapping[str, Quantity]):
         ]
         widths = [max((len(line[column]) for line in cells), default=0) for column in (0, 1)]
         lines = [f"{name:<{widths[0]}}  {value:<{widths[1]}}  {what}" for name, value, what in cells]
+        head = [SIMULATED_RUN] if self.is_simulated else []
         return "\n".join(
-            [*lines, self.verdict, *(f"warning {one.code}: {one.message}" for one in self.warnings)]
+            [*head, *lines, self.verdict, *(f"warning {one.code}: {one.message}" for one in self.warnings)]
         )
 
     def __repr__(self) -> str:
@@ -165,7 +172,9 @@ class Result(Mapping[str, Quantity]):
             for row, found in self._rows()
         )
         notes = "".join(f"<li>{escape(one.code)}: {escape(str(one.message))}</li>" for one in self.warnings)
-        return f"<table>{rows}</table><p>{escape(self.verdict)}</p>" + (f"<ul>{notes}</ul>" if notes else "")
+        head = f"<p><b>{escape(SIMULATED_RUN)}</b></p>" if self.is_simulated else ""
+        table = f"<table>{rows}</table><p>{escape(self.verdict)}</p>"
+        return f"{head}{table}" + (f"<ul>{notes}</ul>" if notes else "")
 
     def _rows(self) -> Iterator[tuple[QuantityDefinition, Quantity]]:
         return ((row, self[row.name]) for row in CATALOGUE if row.name in self)

@@ -74,7 +74,10 @@ def reference() -> str:
             "\n## Each saved analysis, in its group `analysis_NNN`\n",
             *_fields(schema.ANALYSIS_FIELDS),
             "\nThe groups `results`, `model`, `tried`, `budget`, `events` and `warnings` beside them repeat"
-            "\nparts of `document` for other programs; this one reads `document`.",
+            "\nparts of `document` for other programs; this one reads `document`. An analysis whose texts"
+            "\ndiffer from their checksum, or whose groups hold anything but what `document` says, is"
+            "\nreported as damaged and not used. Files of earlier versions without it are checked by their"
+            "\ngroups alone.",
             "",
         ]
     )

@@ -50,8 +50,8 @@ def judge(
     """Set the degree of the verdict, and f_d in the budget to the value that the degree stands for.
 
     `ideal` is the likeliest fit on an ideal stand, `spread` the standard deviation of f_d between models that
-    the record leaves possible. A law that was asked for keeps its f_d. Results that cannot be leave the
-    budget.
+    the record leaves possible. A law that was asked for keeps its f_d, whose uncertainty includes the
+    difference from that of the plate where both agree. Results that cannot be leave the budget.
     """
     warnings = list(remove_friction_of_tilted_plane(budget))
     joint, found = _compare_estimates(joint, plate, budget, ideal, spread, law_is_given=law_is_given)
@@ -88,6 +88,10 @@ def _compare_estimates(
         return joint, [_disagreement(own, plate)]
     holds = plate is not None and plate.misfit < MISFIT_MAX and difference < _SPREAD_MAX * own.value
     if law_is_given:
+        if holds:
+            left = (selection.residual_share or 0.0) * own.value
+            for name in _NAMES.intersection(results):
+                budget.widen(name, BudgetSource.MODEL, max(difference, left))
         return _with_degree(joint, Degree.FRICTION if holds else Degree.NONE), []
     if plate is not None and holds:
         value, shares = combine_estimates(

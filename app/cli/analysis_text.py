@@ -9,7 +9,7 @@ from analysis.motion.two_mass import PEAK_RATES
 from analysis.verdict_text import EFFECT_TITLES, describe_verdict
 from app.cli import output as out
 from app.runs.analysis_json import read_model, read_quantity
-from app.runs.origin import SIMULATED, is_simulated, origin_rows
+from app.runs.origin import SIMULATED_RUN, is_simulated, origin_rows
 
 _BODIES: Final = ("table", "plate")
 _LARGEST: Final = ("velocity_max_m_per_s", "acceleration_max_m_per_s2")
@@ -27,7 +27,7 @@ def print_analysis(document: dict[str, Any], reading: str = "m") -> None:
     origin = document.get("origin", {})  # unknown of results kept by a later version
     out.print_line(f"{document['run']}  {document['series'] or ''}".rstrip())
     if is_simulated(origin):
-        out.print_line(f"  {SIMULATED}: this run is of a simulated stand, not of a real one")
+        out.print_line(f"  {SIMULATED_RUN}")
     out.print_line(
         f"  {quality['samples']} samples, {quality['missing']} missing, "
         f"{quality['damaged']} damaged, {quality['overloaded']} overloaded"

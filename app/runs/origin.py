@@ -17,6 +17,7 @@ from config.schema import Filter, Gauge
 Document = dict[str, Any]
 SIMULATED: Final = "SIMULATED"
 """Stands beside every result of a run that no real stand has made."""
+SIMULATED_RUN: Final = f"{SIMULATED}: this run is of a simulated stand, not of a real one"
 GAUGES: Final = {"table": "gauge 1", "relative": "gauge 2"}
 
 

@@ -5,7 +5,7 @@ import hashlib
 import math
 import re
 import zlib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +30,8 @@ from app.runs.fields import (
     read_number,
     read_text,
     text_type,
+    to_python,
     write_fields,
-    write_number,
     write_text,
 )
 from app.runs.metadata import RunMetadata
@@ -117,9 +117,9 @@ def inputs_hash(record: Record) -> str:
     Which release of the record is analysed belongs to the request, and the end of its free decay is found.
     """
     digest = hashlib.blake2b(digest_size=16)
-    for field in (field for field in fields(record) if field.name not in ("release", "decay_end_s")):
-        value = getattr(record, field.name)
-        digest.update(field.name.encode())
+    for name in (part.name for part in fields(record) if part.name not in ("release", "decay_end_s")):
+        value = getattr(record, name)
+        digest.update(name.encode())
         digest.update(value.tobytes() if isinstance(value, np.ndarray) else msgspec.json.encode(value))
     return digest.hexdigest()
 
@@ -160,16 +160,15 @@ def save_analysis(path: Path, document: Document, inputs: str, settings: dict[st
 
 def read_analyses(file: h5py.File) -> tuple[SavedAnalysis, ...]:
     """All analyses kept in an open run, oldest first; those that are damaged are left out."""
-    return tuple(
-        msgspec.convert(read_fields(group, schema.ANALYSIS_FIELDS), SavedAnalysis)
-        for group in (_group(file, number) for number in _numbers(file))
-        if not _is_damaged(group)
-    )
+    return read_all_analyses(file)[0]
 
 
-def damaged_analyses(file: h5py.File) -> tuple[int, ...]:
-    """Numbers of the analyses in an open run that are not what was kept, by their checksum."""
-    return tuple(number for number in _numbers(file) if _is_damaged(_group(file, number)))
+def read_all_analyses(file: h5py.File) -> tuple[tuple[SavedAnalysis, ...], tuple[int, ...]]:
+    """Analyses kept in an open run, oldest first, and the numbers of those that are not what was kept."""
+    numbers = _numbers(file)
+    kept = {number: _read(_group(file, number)) for number in numbers}
+    undamaged = tuple(analysis for analysis in kept.values() if analysis is not None)
+    return undamaged, tuple(number for number in numbers if kept[number] is None)
 
 
 def _numbers(file: h5py.File) -> list[int]:
@@ -192,59 +191,120 @@ def _checksum(group: h5py.Group) -> int:
     return zlib.crc32("\0".join(texts).encode())
 
 
-def _is_damaged(group: h5py.Group) -> bool:
-    """Tell whether an analysis is not what was kept. Earlier versions kept no checksum."""
+def _read(group: h5py.Group) -> SavedAnalysis | None:
+    """Analysis of a group; None if it is not what was kept. Earlier versions kept no checksum."""
     stored = read_number(group, schema.ANALYSIS_CHECKSUM)
-    return stored is not None and stored != _checksum(group)
+    if stored is not None and stored != _checksum(group):
+        return None
+    analysis = msgspec.convert(read_fields(group, schema.ANALYSIS_FIELDS), SavedAnalysis)
+    copies = _copies(analysis.document)
+    return analysis if all(_agrees(group.get(name), copies[name]) for name in copies) else None
 
 
 def _write(group: h5py.Group, kept: SavedAnalysis) -> None:
-    document = kept.document
     write_fields(group, schema.ANALYSIS_FIELDS, kept)
     write_text(group, "program", "slipstand")
     group[schema.ANALYSIS_CHECKSUM] = np.uint32(_checksum(group))
-    _write_results(make_group(group, "results", "NXcollection"), document["results"])
-    model = document["model"] or {}
-    _write_values(make_group(group, "model", "NXcollection"), model)
-    _write_table(make_group(group, "tried", "NXcollection"), model.get("tried", []))
-    _write_table(make_group(group, "budget", "NXcollection"), document["budget"])
-    _write_values(make_group(group, "events", "NXcollection"), document["events"])
-    _write_table(
-        make_group(group, "warnings", "NXcollection"),
-        [{name: warning[name] for name in ("code", "message")} for warning in document["warnings"]],
-    )
+    for name, copies in _copies(kept.document).items():
+        part = make_group(group, name, "NXcollection")
+        for key, copy in copies.items():
+            copy.write(part, key)
 
 
-def _write_results(group: h5py.Group, results: dict[str, Any]) -> None:
-    for name, result in results.items():
-        if not isinstance(result, dict):
-            _write_values(group, {name: result})
-            continue
-        write_number(group, name, result["value"], result["unit"])
-        for fact in ("standard_uncertainty", "interval_95"):
-            if result[fact] is not None:
-                group[name].attrs[fact] = result[fact]
+@dataclass(frozen=True, slots=True)
+class _Copy:
+    """Part of a document as a dataset: one value, or a column with a value a row."""
 
+    value: str | float | list[str] | list[float]
+    attributes: dict[str, Any] = field(default_factory=dict)
 
-def _write_values(group: h5py.Group, values: dict[str, Any]) -> None:
-    """Texts, truths and numbers; anything else is in `document` alone."""
-    for name, value in values.items():
-        if isinstance(value, str):
-            write_text(group, name, value)
-        elif isinstance(value, bool | int | float):
-            write_number(group, name, value)
-
-
-def _write_table(group: h5py.Group, rows: list[dict[str, Any]]) -> None:
-    """One column a key; numbers that are absent are NaN, words of a list stand in one text."""
-    for name in rows[0] if rows else ():
-        column = [", ".join(x) if isinstance(x := row[name], list) else x for row in rows]
-        if isinstance(column[0], str):
-            data = [text.encode() for text in column]
+    def write(self, group: h5py.Group, name: str) -> None:
+        """Make the dataset. An empty text is left out."""
+        if isinstance(self.value, str):
+            write_text(group, name, self.value)
+        elif isinstance(self.value, list) and isinstance(self.value[0], str):
+            data = [str(text).encode() for text in self.value]
             kind = text_type(b"".join(data), max(1, *map(len, data)))
             group.create_dataset(name, data=np.array(data, dtype=kind))
         else:
-            group.create_dataset(name, data=np.array([math.nan if x is None else x for x in column], float))
+            group.create_dataset(name, data=self.value)
+        for key, value in self.attributes.items():
+            group[name].attrs[key] = value
+
+    def equals(self, dataset: h5py.Dataset) -> bool:
+        """Tell whether a dataset and its attributes hold exactly this."""
+        attributes = dict(dataset.attrs)
+        return (
+            _is_same(dataset[()], self.value)
+            and attributes.keys() == self.attributes.keys()
+            and all(_is_same(attributes[key], value) for key, value in self.attributes.items())
+        )
+
+
+def _is_same(stored: Any, value: Any) -> bool:
+    """Tell whether what h5py reads is this text, number or list; NaN is NaN."""
+    expected, found = np.asarray(value), np.asarray(_plain(stored))
+    if expected.dtype.kind == "U" or found.dtype.kind == "U":
+        return bool(np.array_equal(expected, found))
+    return bool(np.array_equal(expected, found, equal_nan=True))
+
+
+def _plain(stored: Any) -> Any:
+    plain = to_python(stored)
+    return [to_python(item) for item in plain] if isinstance(plain, list) else plain
+
+
+def _agrees(group: h5py.Group | None, copies: dict[str, _Copy]) -> bool:
+    """Tell whether all datasets of a group are copies of the document."""
+    return group is None or all(
+        name in copies and copies[name].equals(dataset) for name, dataset in group.items()
+    )
+
+
+def _copies(document: Document) -> dict[str, dict[str, _Copy]]:
+    """Parts of a document that other programs find as datasets, by group and name."""
+    model = document["model"] or {}
+    warnings = [{name: warning[name] for name in ("code", "message")} for warning in document["warnings"]]
+    return {
+        "results": _result_copies(document["results"]),
+        "model": _value_copies(model),
+        "tried": _column_copies(model.get("tried", [])),
+        "budget": _column_copies(document["budget"]),
+        "events": _value_copies(document["events"]),
+        "warnings": _column_copies(warnings),
+    }
+
+
+def _result_copies(results: dict[str, Any]) -> dict[str, _Copy]:
+    quantities = {name: result for name, result in results.items() if isinstance(result, dict)}
+    labels = {name: label for name, label in results.items() if name not in quantities}
+    return _value_copies(labels) | {
+        name: _Copy(result["value"], _quantity_attributes(result)) for name, result in quantities.items()
+    }
+
+
+def _quantity_attributes(result: dict[str, Any]) -> dict[str, Any]:
+    attributes = {"units": result["unit"]} if result["unit"] else {}
+    facts = ("standard_uncertainty", "interval_95")
+    return attributes | {fact: result[fact] for fact in facts if result[fact] is not None}
+
+
+def _value_copies(values: dict[str, Any]) -> dict[str, _Copy]:
+    """Texts, truths and numbers; anything else is in `document` alone."""
+    return {
+        name: _Copy(value) for name, value in values.items() if isinstance(value, str | bool | int | float)
+    }
+
+
+def _column_copies(rows: list[dict[str, Any]]) -> dict[str, _Copy]:
+    """One column a key; numbers that are absent are NaN, words of a list stand in one text."""
+    return {name: _Copy([_cell(row[name]) for row in rows]) for name in (rows[0] if rows else ())}
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, list):
+        return ", ".join(value)
+    return value if isinstance(value, str) else math.nan if value is None else float(value)
 
 
 def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:

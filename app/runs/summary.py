@@ -11,7 +11,7 @@ from app.runs.columns import stored_rows
 from app.runs.fields import read_text
 from app.runs.metadata import Conditions, RunSource
 from app.runs.metadata_io import read_identifier, read_metadata
-from app.runs.saved_analyses import damaged_analyses, metadata_hash, read_analyses
+from app.runs.saved_analyses import metadata_hash, read_all_analyses
 from messages.message import Message
 
 
@@ -67,7 +67,7 @@ def summarize_file(file: h5py.File) -> RunSummary:
     """Summary of an open run. Raises DamagedRunError."""
     metadata = read_metadata(file)
     rows = stored_rows(file)
-    analyses = read_analyses(file)
+    analyses, damaged = read_all_analyses(file)
     results = analyses[-1].document["results"] if analyses else {}
     friction, period, damping = (
         results.get(name, {}) for name in ("friction_dynamic", "period_s", "damping_n1_per_s")
@@ -82,7 +82,7 @@ def summarize_file(file: h5py.File) -> RunSummary:
         duration_s=float(file[schema.TIME][rows - 1]) if rows else 0.0,
         ended=read_text(file, schema.ENDED),
         analyses=len(analyses),
-        damaged_analyses=len(damaged_analyses(file)),
+        damaged_analyses=len(damaged),
         friction_dynamic=friction.get("value"),
         friction_dynamic_uncertainty=friction.get("standard_uncertainty"),
         period_s=period.get("value"),

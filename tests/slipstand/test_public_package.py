@@ -55,9 +55,33 @@ def test_gains_that_are_left_out_are_warned_of_and_make_no_line_that_is_no_numbe
     assert all(np.isfinite(line.standard_uncertainty) for line in result.budget)
     stated = api.Record.from_arrays(
         result.record.time_s, result.record.table_displacement_m, result.record.relative_displacement_m,
-        table_mass_kg=131.6, plate_mass_kg=22.4, gain_uncertainties=(0.001, 0.001),
+        table_mass_kg=131.6, plate_mass_kg=22.4, gain_uncertainties=(0.001, 0.001), clock_uncertainty=2e-5,
     )  # fmt: skip
-    assert "gain-not-stated" not in [one.code for one in api.identify(stated).warnings]
+    codes = [one.code for one in api.identify(stated).warnings]
+    assert not {"gain-not-stated", "clock-not-timed"} & set(codes)
+
+
+def test_a_clock_that_is_left_out_is_warned_of(test) -> None:
+    readings = test.record.table_displacement_m, test.record.relative_displacement_m
+    record = api.Record.from_arrays(test.record.time_s, *readings, table_mass_kg=131.6, plate_mass_kg=22.4)
+    assert "clock-not-timed" in [one.code for one in api.identify(record).warnings]
+
+
+def test_a_quantity_prints_with_the_digits_that_its_uncertainty_leaves() -> None:
+    assert str(api.Quantity.normal(0.11000077376633005, 0.0001558979507805286, "1")) == "0.11000 ± 0.00016"
+    assert str(api.Quantity.normal(0.31999891302307654, 6.5880200069818774e-06, "s")) == (
+        "0.3199989 ± 0.0000066 s"
+    )
+
+
+def test_a_law_that_fails_is_as_uncertain_as_its_difference_from_the_plate_alone() -> None:
+    record = api.simulate("1FFM0", friction_dynamic=0.10, friction_static=0.12, seed=2).record
+    found = api.identify(record, model="coulomb")
+    friction, plate = found["friction_dynamic"], found["friction_dynamic_plate"]
+    assert found.model is not None
+    assert not found.model.adequate
+    assert friction.standard_uncertainty >= abs(friction.value - plate.value)
+    assert abs(friction.value - 0.10) < 2.0 * friction.standard_uncertainty
 
 
 @pytest.mark.parametrize(
@@ -78,6 +102,10 @@ def test_a_run_gives_what_the_command_line_gives(tmp_path, slipstand) -> None:
     path = tmp_path / "run.h5"
     slipstand("simulate", "--series", "2SSM1", "-o", path)
     (by_command,) = slipstand("analyze", path, "--json").json
+    of_run = api.identify(api.read_run(path))
+    assert str(of_run).startswith("SIMULATED: ")
+    assert "<b>SIMULATED: " in of_run._repr_html_()
+    assert "<b>SIMULATED: " in api.pool(path)._repr_html_()
     run = api.read_run(path)
     result = api.identify(run)
     assert result.document["results"] == by_command["results"]

@@ -182,4 +182,5 @@ def figure_title(title: str, identification: Identification) -> str:
         return f"{title}\n{'    '.join([*values, verdict])}"
     if found is None:
         return title
-    return f"{title}    $f_d$ = {found.value:.5f} ± {found.standard_uncertainty:.5f}    {verdict}"
+    friction = definition("friction_dynamic").format(found, Place.REPORT).in_print
+    return f"{title}    $f_d$ = {friction}    {verdict}"

@@ -133,7 +133,8 @@ _UNBROKEN: Final = "\u00a0%"
 _SAID, _NAMED = 3, 12  # series for which a warning is printed in full, and that are named
 LEGEND: Final = (
     "In parentheses: standard uncertainty of the last digits. * a run is far from the others, ! no friction"
-    " law explains a run. f_s without parentheses: the runs only bound it."
+    " law explains a run, ~ no model explains a run, but its f_d holds. f_s without parentheses: the"
+    " runs only bound it."
 )
 REPEATS_LEGEND: Final = (
     "Standard deviation of the runs in percent of the mean, and Birge ratio (1: the runs scatter as their"

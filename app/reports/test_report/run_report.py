@@ -21,6 +21,7 @@ from analysis.formatting import (
     format_fixed,
     format_interval,
     format_uncertainty,
+    format_value,
     typeset,
     typeset_sentence,
     uncertainty_decimals,
@@ -36,7 +37,7 @@ from app.reports.test_report import blocks, shared
 from app.reports.test_report.blocks import Cell, Section, Text
 from app.runs.analyze import Analysis
 from app.runs.metadata import Conditions, RunMetadata
-from app.runs.origin import SIMULATED, is_simulated, origin_rows
+from app.runs.origin import SIMULATED_RUN, is_simulated, origin_rows
 from app.runs.reader import Fingerprint
 from drivers.samples import Losses
 
@@ -88,7 +89,7 @@ def run_sections(
 def _notices(analysis: Analysis, excluded: str) -> Iterator[blocks.Block]:
     """Notices above the result: that it is simulated, an exclusion, and an expired calibration."""
     if is_simulated(analysis.document["origin"]):
-        yield blocks.Notice(f"{SIMULATED}: this run is of a simulated stand, not of a real one.")
+        yield blocks.Notice(f"{SIMULATED_RUN}.")
     if excluded:
         left_out = f"This run is left out of the campaign's results: {excluded}."
         yield blocks.Notice(f"{left_out} What follows is for information only.")
@@ -143,9 +144,6 @@ def _test(analysis: Analysis) -> blocks.Facts:
     run, metadata = analysis.run, analysis.run.metadata
     ending, events = run.end, analysis.identification.events
     device = metadata.device
-    slip_s = None
-    if events.release_s is not None and events.slip_end_s is not None:
-        slip_s = events.slip_end_s - events.release_s
     rows = [
         ("run", run.path.name),
         ("title", metadata.title),
@@ -163,11 +161,17 @@ def _test(analysis: Analysis) -> blocks.Facts:
         ("source", metadata.origin),
         ("ended", "" if ending is None else _ENDINGS.get(ending.ended, ending.ended)),
         ("hold before release", "" if ending is None else shared.in_unit(ending.dwell_s, SECOND, 2)),
-        ("slip lasted", shared.in_unit(slip_s, SECOND, 3)),
+        ("released at", _time(events.release_s, events.release_uncertainty_s)),
+        ("slip ended at", _time(events.slip_end_s, events.slip_end_uncertainty_s)),
         ("samples", _samples(run.losses)),
         ("note", metadata.note),
     ]
     return shared.without_empty(rows)
+
+
+def _time(time_s: float | None, uncertainty_s: float | None) -> str:
+    """A time of the record with its standard uncertainty; "" for None."""
+    return "" if time_s is None else format_value(time_s, uncertainty_s, SECOND.symbol).in_print
 
 
 def _samples(losses: Losses) -> str:

@@ -18,7 +18,13 @@ from config.schema import Gauge, Gauges, Stand
 
 NOT_STATED = "not stated"
 
-SIGNATURES: Final = Section("Signatures", [Signatures(["Tested by", "Checked by", "Approved by"])])
+SIGNATURES: Final = Section(
+    "Signatures",
+    [
+        Text("The results are those of the runs named in this report, and of no others."),
+        Signatures(["Tested by", "Checked by", "Approved by"]),
+    ],
+)
 PROCEDURE: Final = Section(
     "Procedure",
     [

@@ -16,7 +16,7 @@ from app.runs.fields import read_text
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import check_openable, read_file
-from app.runs.saved_analyses import Document, SavedAnalysis, metadata_hash, read_analyses
+from app.runs.saved_analyses import Document, SavedAnalysis, metadata_hash, read_all_analyses
 from app.runs.schema import ENDED
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError
@@ -88,21 +88,22 @@ def validate_and_count(path: Path, validator: Validator) -> int:
 
 def latest_valid_in_file(
     file: h5py.File, metadata: RunMetadata, wanted: Callable[[SavedAnalysis], bool]
-) -> tuple[SavedAnalysis | None, bool]:
-    """Newest analysis kept in a run that is wanted and not stale; and whether newer ones are stale.
+) -> tuple[SavedAnalysis | None, bool, tuple[int, ...]]:
+    """Newest analysis kept in a run that is wanted and not stale, whether newer ones are stale, damaged ones.
 
     Raises DamagedRunError where the samples that it was made of are not what was stored.
     """
     stale = False
-    for saved in reversed(read_analyses(file)):
+    analyses, damaged = read_all_analyses(file)
+    for saved in reversed(analyses):
         if not wanted(saved):
             continue
         masses = {name: saved.settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
         if saved.metadata_hash == metadata_hash(file, metadata, **masses):
             check_samples(file)
-            return saved, stale
+            return saved, stale, damaged
         stale = True
-    return None, stale
+    return None, stale, damaged
 
 
 def kept_document(file: h5py.File, saved: SavedAnalysis, metadata: RunMetadata) -> Document:
@@ -114,7 +115,7 @@ def kept_document(file: h5py.File, saved: SavedAnalysis, metadata: RunMetadata) 
 def _kept(file: h5py.File, path: Path, wanted: AnalysisRequest) -> AnalysisOutcome | None:
     """The analysis kept in a run that was asked for in the same words, if it still stands."""
     metadata = read_metadata(file)
-    saved, _ = latest_valid_in_file(
+    saved, *_ = latest_valid_in_file(
         file, metadata, lambda saved: AnalysisRequest.of_settings(saved.settings) == wanted
     )
     if saved is None:

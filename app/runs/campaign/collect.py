@@ -327,8 +327,7 @@ def _damaged(runs: Sequence[CountedRun]) -> Iterator[ResultWarning]:
         yield ResultWarning(
             "result-damaged",
             message(
-                "results kept in {listed} are not what was kept, by their checksum: they are not taken."
-                " Restore a good copy.",
+                "results kept in {listed} are not what was kept: they are not taken. Restore a good copy.",
                 listed=_listed(damaged),
             ),
         )

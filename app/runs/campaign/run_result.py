@@ -26,7 +26,7 @@ from app.runs.hashes import content_hash
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import read_file
-from app.runs.saved_analyses import Document, damaged_analyses
+from app.runs.saved_analyses import Document
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError
 from messages.message import EMPTY, Message
@@ -96,14 +96,14 @@ def collect_kept(path: Path, validator: Validator | None = None) -> CollectedRun
 
 def _read(file: h5py.File) -> tuple[RunDetails, Document | None]:
     metadata = read_metadata(file)
-    saved, stale = latest_valid_in_file(
+    saved, stale, damaged = latest_valid_in_file(
         file,
         metadata,
         lambda saved: (
             saved.document["kind"] == "two-mass" and not any(saved.settings.get(name) for name in _MASSES)
         ),
     )
-    details = RunDetails(metadata, read_identifier(file), stale=stale, damaged=damaged_analyses(file))
+    details = RunDetails(metadata, read_identifier(file), stale=stale, damaged=damaged)
     if saved is None:
         return details, None
     document = kept_document(file, saved, metadata)

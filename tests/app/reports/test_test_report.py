@@ -27,6 +27,7 @@ from app.reports.test_report.blocks import (
 from app.reports.test_report.build import build_report
 from app.reports.test_report.head import ReportHead
 from app.reports.test_report.render import printable, render_pdf, typeset_report, write_report
+from app.reports.test_report.shared import SIGNATURES
 from app.runs.analyze import repeat_saved_analysis
 from app.runs.campaign.collect import CollectOptions, collect_runs
 from app.runs.campaign.origin import CampaignOrigin
@@ -191,7 +192,7 @@ def test_report_bears_stand_gauges_fingerprints_and_places_to_sign(of_run, folde
         assert fact in said, fact
     assert hashlib.sha256((folder / "a.h5").read_bytes()).hexdigest() in said
     assert re.search(r"table_displacement [0-9a-f]{8}", said)
-    assert part(of_run, "Signatures")[0].roles == ["Tested by", "Checked by", "Approved by"]
+    assert part(of_run, "Signatures")[-1].roles == ["Tested by", "Checked by", "Approved by"]
     assert of_run.software.startswith("Slipstand ")
 
 
@@ -236,6 +237,25 @@ def test_the_mark_stands_on_each_page_and_tells_how_many_runs_are_simulated(of_c
     runs = {"a": details("simulated"), "b": details("real")}
     assert CampaignOrigin(runs=runs).mark == "SIMULATED: 1 of 2 runs"
     assert CampaignOrigin(runs={"b": runs["b"]}).mark == ""
+
+
+@pytest.mark.parametrize("origin", [5, 90])
+@pytest.mark.parametrize("kind", [Points, Facts])
+def test_signatures_share_their_page_with_the_end_of_what_precedes_them(kind, origin):
+    def last_page(lines, end):
+        texts = [*(f"line {number}" for number in range(origin)), end]
+        listed = Points(texts) if kind is Points else Facts([("fact", text) for text in texts])
+        report = small(Text("\n".join(["a"] * lines)))
+        sections = [*report.sections, Section("Origin", [listed]), SIGNATURES]
+        pages = render_pages(msgspec.structs.replace(report, sections=sections), 20.0)
+        return pages[-1] if isinstance(pages, list) else pages
+
+    for lines in range(1, 60, 5):
+        assert last_page(lines, "mmmm") != last_page(lines, "....."), lines
+
+
+def test_a_percentage_is_not_parted_at_the_end_of_a_line():
+    assert printable("5 % of it, 50 %") == "5\u00a0% of it, 50\u00a0%"
 
 
 def test_landscape_pages_of_a_campaign_follow_each_other(of_campaign):

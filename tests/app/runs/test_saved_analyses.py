@@ -13,9 +13,9 @@ from app.runs.edits import edit_run
 from app.runs.reader import open_run
 from app.runs.saved_analyses import (
     analysis_document,
-    damaged_analyses,
     inputs_hash,
     latest_valid,
+    read_all_analyses,
     save_analysis,
 )
 from app.runs.validator import shared_validator
@@ -126,9 +126,71 @@ def test_an_analysis_that_is_not_what_was_kept_is_not_taken(run_path):
     run = open_run(run_path)
     assert [saved.number for saved in run.analyses] == [1]
     with h5py.File(run_path) as file:
-        assert damaged_analyses(file) == (2,)
+        assert read_all_analyses(file)[1] == (2,)
     summary = shared_validator().validate(run_path)
     assert (summary.friction_dynamic, summary.damaged_analyses) == (0.1001, 1)
+
+
+def _set(path, value):
+    def change(group):
+        group[path][()] = value
+
+    return change
+
+
+def _set_attribute(path, name, value):
+    def change(group):
+        group[path].attrs[name] = value
+
+    return change
+
+
+def _set_cell(path, row, value):
+    def change(group):
+        group[path][row] = value
+
+    return change
+
+
+def _add(path, value):
+    def change(group):
+        group[path] = value
+
+    return change
+
+
+@pytest.mark.parametrize("has_checksum", [True, False])
+@pytest.mark.parametrize(
+    "change",
+    [
+        _set("results/friction_dynamic", 0.1991),
+        _set("results/msk64_degree", b"X"),
+        _set("results/coulomb_significant", True),
+        _set_attribute("results/friction_dynamic", "standard_uncertainty", 4e-5),
+        _set_attribute("results/friction_dynamic", "interval_95", [0.0, 1.0]),
+        _set_attribute("results/period_s", "units", "ms"),
+        _set_attribute("results/friction_static", "standard_uncertainty", 0.001),
+        _add("results/tilt_rad", 0.001),
+        _set("model/adequate", False),
+        _set_cell("tried/friction_dynamic", 1, 0.2),
+        _set_cell("tried/bic", 1, -9.0),
+        _set_cell("budget/standard_uncertainty", 0, 3e-5),
+        _set_cell("budget/source", 0, b"gauge 2 gain"),
+        _set("events/release_s", 2.5),
+        _set_cell("warnings/code", 0, b"no-slip"),
+    ],
+)
+def test_a_result_whose_fields_differ_from_its_text_is_not_taken(run_path, change, has_checksum):
+    run = open_run(run_path)
+    save_analysis(run_path, _document(run), inputs_hash(to_record(run)), {"model": "auto"})
+    with h5py.File(run_path, "r+") as file:
+        if not has_checksum:
+            del file["entry/analysis_001/crc32"]
+        assert read_all_analyses(file)[1] == ()
+        change(file["entry/analysis_001"])
+
+    assert open_run(run_path).analyses == ()
+    assert shared_validator().validate(run_path).damaged_analyses == 1
 
 
 def test_an_analysis_of_a_version_without_checksum_is_taken(run_path):
