@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
@@ -18,7 +18,7 @@ from drivers.errors import DeviceLostError, NoDataError, ProtocolError, QueueFul
 from drivers.host_time import ArrivalRate, host_ns
 from drivers.recognition import describe_unreadable
 from drivers.samples import ChannelFilter, DeviceIdentity, Losses, SampleBlock
-from drivers.source import CollectLimit, Decoder, Link
+from drivers.source import CollectLimit, Decoder, Link, Read
 from messages.i18n import N_
 from messages.message import EMPTY, Message, MessageError, message, message_of
 
@@ -166,6 +166,12 @@ class SampleSource(ABC):
             raise self.no_data_error(data)
         else:
             self._pending = data
+
+    def decode_reads(self, reads: Sequence[Read]) -> list[SampleBlock]:
+        """Samples completed by consecutive reads: the rows and losses that `decode` of each read gives."""
+        if self._decoder is not None and all(data for data, _ in reads):
+            return self._decoder.feed_reads(reads)
+        return [block for data, arrival_ns in reads for block in self.decode(data, arrival_ns)]
 
     def await_data(
         self, link: Link, timeout_s: float, is_good: Callable[[bytes], object]

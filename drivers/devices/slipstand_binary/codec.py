@@ -139,6 +139,7 @@ class FrameDecoder(PacketDecoder):
     """
 
     _piece_bytes = 1 << 18
+    _is_timed_at_restarts_only = True
 
     def __init__(self, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
         super().__init__(STATE, rate_hz, max_gap_s)
