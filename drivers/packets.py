@@ -117,7 +117,8 @@ class PacketDecoder(Decoder):
 
     def feed_reads(self, reads: Sequence[Read]) -> list[SampleBlock]:
         if self._is_timed_at_restarts_only and not self._state["restarting"]:
-            before = {**vars(self), "_state": self._state.copy()}
+            kept = vars(self).items()
+            before = {name: part.copy() if isinstance(part, np.ndarray) else part for name, part in kept}
             blocks = self._feed_joined(reads)
             if self._arrival_ns is not None and self._state["restarts"] == before["_state"]["restarts"]:
                 return blocks
