@@ -30,6 +30,7 @@ RATE_TOLERANCE = 0.02
 """Two rates that differ by less are the same: resonators of cheap boards are off by up to 0.5 %, and a rate
 from half a second of times of 1 ms is good to 0.4 %."""
 _MAX_PENDING_BYTES = 1 << 20
+_MAX_AWAITED_BYTES = 1 << 24  # what the fastest devices send in 3 s
 _STALL_S = 0.5
 """A read waits for 50 ms: where more time has passed, this computer stood still."""
 _MIN_WAIT_S = 0.1  # bytes that wait in the port are looked at, even if the deadline has passed
@@ -179,7 +180,7 @@ class SampleSource(ABC):
         """Read until all is good, or for `timeout_s` of running time; returns it and whether it is good."""
         received, now_s = b"", time.perf_counter()
         deadline_s = now_s + max(timeout_s, _MIN_WAIT_S)
-        while now_s < deadline_s:
+        while now_s < deadline_s and len(received) < _MAX_AWAITED_BYTES:
             data = link.read()
             received += data
             if data and is_good(received):

@@ -30,7 +30,8 @@ SAMPLE_BYTES = 8  # two int32
 MAX_SAMPLES = 32
 MIN_FRAME_BYTES = HEADER_BYTES + SAMPLE_BYTES + 2
 
-_IDENTITY = re.compile(rb"slipstand-fw (\S+) (\d+(?:\.\d+)?) (\d+)\r?\n")
+_IDENTITY = re.compile(rb"slipstand-fw (\S{1,100}) (\d{1,9}(?:\.\d{1,9})?) (\d{1,9})\r?\n")
+_ENDLESS_IDENTITY = re.compile(rb"slipstand-fw [!-~]{101}")
 _FRAMES_PER_S = 200.0
 """Frames a second below 6.4 kHz: a sample waits for its frame for 5 ms at most."""
 _MAX_RATE_HZ = 1_000_000
@@ -71,9 +72,16 @@ def encode_identity(identity: FirmwareIdentity) -> bytes:
 
 
 def find_identity(received: bytes) -> FirmwareIdentity | None:
-    """Identity line in `received`; None while it is incomplete. Raises ProtocolError without 2 channels."""
+    """Identity line in `received`; None while it is incomplete.
+
+    Raises ProtocolError without 2 channels, and for a version that does not end.
+    """
     match = _IDENTITY.search(received)
     if match is None:
+        if _ENDLESS_IDENTITY.search(received):
+            raise ProtocolError(
+                "the device states a version of more than 100 characters: flash its firmware anew"
+            )
         return None
     identity = FirmwareIdentity(match[1].decode("ascii", "replace"), float(match[2]), int(match[3]))
     if identity.channels != 2:

@@ -1,6 +1,8 @@
 """Many tasks in worker processes: order, bounds, failures, dead workers, interruption."""
 
 import os
+import subprocess
+import sys
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
@@ -168,3 +170,27 @@ def test_a_crash_in_a_worker_prints_its_traceback_where_that_is_wanted(
     assert outcome.error.template.startswith("Slipstand itself failed")
     printed = capfd.readouterr().err
     assert ("Traceback (most recent call last)" in printed) == bool(debug)
+
+
+_ENDED_WHILE_IT_LOADS = """
+import multiprocessing, os, signal, sys
+from app.runs.batch.parent_watchdog import exit_with_parent
+
+lifeline, _ = multiprocessing.Pipe(duplex=False)
+exit_with_parent(lifeline)
+
+class Loading:
+    def __del__(self):  # an exception in it is reported and goes no further, as in a callback of LLVM
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        finally:
+            os.write(2, b"LLVM ERROR: cut off")
+
+Loading()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGTERM ends a process at once there")
+def test_a_process_that_is_ended_while_it_loads_code_reports_nothing():
+    ended = subprocess.run([sys.executable, "-c", _ENDED_WHILE_IT_LOADS], capture_output=True, text=True)
+    assert ended.stderr == ""
