@@ -34,7 +34,7 @@ from analysis.motion.two_mass import Motion, TwoMassParameters
 from analysis.preparation.channels import SAMPLES_MIN, Channel
 from analysis.preparation.free_decay import TAIL_PERIODS_MIN
 from analysis.quantities import BudgetLine, BudgetSource, Quantity, ResultWarning, result_warning
-from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses
+from analysis.record import AnalysisError, GaugeUncertainty, Record, StandMasses, unstated_gain_warnings
 from analysis.results.diagnosis import result_names
 from analysis.results.fitted_quantities import msk64_degree
 from analysis.results.joint_fit import (
@@ -43,7 +43,7 @@ from analysis.results.joint_fit import (
     add_systematic_uncertainty,
     law_places,
 )
-from analysis.uncertainty import LinearForm, UncertaintyBudget, propagate_expected, unstated_gain_warnings
+from analysis.uncertainty import LinearForm, UncertaintyBudget, propagate_expected
 from messages.i18n import N_
 from messages.message import message
 

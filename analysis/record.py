@@ -7,8 +7,9 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.quantities import ResultWarning, result_warning
 from messages.i18n import N_
-from messages.message import MessageError, message
+from messages.message import MessageError, joined, message
 
 
 class AnalysisError(MessageError):
@@ -226,3 +227,14 @@ def _float_array(name: str, values: ArrayLike) -> NDArray[np.float64]:
         template = "{name} has {axes} axes. Give one channel as an array with one axis"
         raise RecordError(template, name=name, axes=array.ndim)
     return array
+
+
+def unstated_gain_warnings(table: GaugeUncertainty, relative: GaugeUncertainty | None) -> list[ResultWarning]:
+    """Warn of gauges whose gain has no stated uncertainty; `relative` is None without gauge 2."""
+    gauges = {1: table} if relative is None else {1: table, 2: relative}
+    unstated = [number for number, gauge in gauges.items() if gauge.gain_relative is None]
+    if not unstated:
+        return []
+    names = joined([message("gauge {gauge}", gauge=number) for number in unstated], " and ")
+    template = N_("the gain of {gauges} has no stated uncertainty, so that its part is missing.")
+    return [result_warning("gain-not-stated", template, gauges=names)]

@@ -18,13 +18,9 @@ from analysis.quantities import (
     BudgetSource,
     OtherLaw,
     Quantity,
-    ResultWarning,
     Source,
-    result_warning,
 )
-from analysis.record import GaugeUncertainty, Record
-from messages.i18n import N_
-from messages.message import joined, message
+from analysis.record import Record
 
 Values = TypeVar("Values", float, Floats)
 
@@ -131,17 +127,6 @@ def unstated_clock(record: Record, results: Mapping[str, Quantity]) -> list[Budg
         for name, quantity in results.items()
         if name in _FRICTION or quantity.unit in _UNITS_WITH_TIME
     ]
-
-
-def unstated_gain_warnings(table: GaugeUncertainty, relative: GaugeUncertainty | None) -> list[ResultWarning]:
-    """Warn of gauges whose gain has no stated uncertainty; `relative` is None without gauge 2."""
-    gauges = {1: table} if relative is None else {1: table, 2: relative}
-    unstated = [number for number, gauge in gauges.items() if gauge.gain_relative is None]
-    if not unstated:
-        return []
-    names = joined([message("gauge {gauge}", gauge=number) for number in unstated], " and ")
-    template = N_("the gain of {gauges} has no stated uncertainty, so that its part is missing.")
-    return [result_warning("gain-not-stated", template, gauges=names)]
 
 
 def levelling_shift(problem: FitProblem, fit: Fit) -> Floats | None:

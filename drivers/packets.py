@@ -5,7 +5,7 @@ reduces its bytes to packets; how packets become rows is the same for all device
 """
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, replace
 
 import numpy as np
@@ -13,7 +13,10 @@ import numpy as np
 from drivers.arrays import Counts, Floats, Record, Records, UInt8s, record_type
 from drivers.compiled import compiled, inlined
 from drivers.samples import Losses, SampleBlock, SampleStatus
-from drivers.source import Decoder
+from drivers.source import Decoder, Read
+
+_SINGLE_READS = 2
+"""Reads that are decoded one by one at the end of many: at least one of them ends a packet as a rule."""
 
 MAX_BLOCK_ROWS = 65536  # a long gap becomes several blocks, so that no block is large
 MAX_GAP_S = 600.0
@@ -67,6 +70,8 @@ class PacketDecoder(Decoder):
     _piece_bytes = 1 << 16  # long data are decoded in pieces that fit a processor's cache
     _has_time = True  # whether the device sends its time
     _loss_estimator: "LossEstimator | None" = None  # for a device whose stream proves no loss
+    _is_timed_at_restarts_only = False
+    """Whether arrival times have a part in rows and losses only where the device restarts."""
 
     def __init__(self, state: np.dtype[np.void], rate_hz: float, max_gap_s: float) -> None:
         self._state = np.zeros(1, dtype=state)
@@ -109,6 +114,25 @@ class PacketDecoder(Decoder):
                 self._loss_estimator.add(rows.stop, arrival_ns)
             blocks = sample_blocks(packets, counts, rows, last_time_s, period_s, arrival_ns)
             yield from blocks if self._has_time else (replace(one, device_time_s=None) for one in blocks)
+
+    def feed_reads(self, reads: Sequence[Read]) -> list[SampleBlock]:
+        if self._is_timed_at_restarts_only and not self._state["restarting"]:
+            kept = vars(self).items()
+            before = {name: part.copy() if isinstance(part, np.ndarray) else part for name, part in kept}
+            blocks = self._feed_joined(reads)
+            if self._arrival_ns is not None and self._state["restarts"] == before["_state"]["restarts"]:
+                return blocks
+            vars(self).update(before)
+        return super().feed_reads(reads)
+
+    def _feed_joined(self, reads: Sequence[Read]) -> list[SampleBlock]:
+        """Decode all but the last reads in one piece; those give the arrival of the last good packet."""
+        joined, single = reads[:-_SINGLE_READS], reads[-_SINGLE_READS:]
+        blocks: list[SampleBlock] = []
+        if joined:
+            blocks += self.feed(b"".join(data for data, _ in joined), joined[-1][1])
+        self._arrival_ns = None
+        return blocks + super().feed_reads(single)
 
     @abstractmethod
     def _find_packets(self, data: bytes, arrival_ns: int) -> tuple[Records, Counts]:

@@ -2,7 +2,7 @@
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -65,6 +65,10 @@ class CancellableLink:
             raise DeviceLostError("the connection was cancelled: connect again")
 
 
+Read = tuple[bytes, int]
+"""Bytes of one read, and the host's monotonic time (ns) after it."""
+
+
 class Decoder(ABC):
     """Bytes in, sample blocks out. It uses no port, clock or thread: recorded bytes give the same blocks."""
 
@@ -76,6 +80,10 @@ class Decoder(ABC):
     @abstractmethod
     def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:
         """Samples completed by `data`; an unfinished rest of bounded size is kept. Exhaust the iterator."""
+
+    def feed_reads(self, reads: Sequence[Read]) -> list[SampleBlock]:
+        """Samples of consecutive reads: the rows and losses that `feed` of each read gives."""
+        return [block for data, arrival_ns in reads for block in self.feed(data, arrival_ns)]
 
     @abstractmethod
     def expect_restart(self) -> None:

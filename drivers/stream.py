@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TypeVar
@@ -18,7 +18,7 @@ from drivers.errors import DeviceLostError, NoDataError, ProtocolError, QueueFul
 from drivers.host_time import ArrivalRate, host_ns
 from drivers.recognition import describe_unreadable
 from drivers.samples import ChannelFilter, DeviceIdentity, Losses, SampleBlock
-from drivers.source import CollectLimit, Decoder, Link
+from drivers.source import CollectLimit, Decoder, Link, Read
 from messages.i18n import N_
 from messages.message import EMPTY, Message, MessageError, message, message_of
 
@@ -30,6 +30,7 @@ RATE_TOLERANCE = 0.02
 """Two rates that differ by less are the same: resonators of cheap boards are off by up to 0.5 %, and a rate
 from half a second of times of 1 ms is good to 0.4 %."""
 _MAX_PENDING_BYTES = 1 << 20
+_MAX_AWAITED_BYTES = 1 << 24  # what the fastest devices send in 3 s
 _STALL_S = 0.5
 """A read waits for 50 ms: where more time has passed, this computer stood still."""
 _MIN_WAIT_S = 0.1  # bytes that wait in the port are looked at, even if the deadline has passed
@@ -167,13 +168,19 @@ class SampleSource(ABC):
         else:
             self._pending = data
 
+    def decode_reads(self, reads: Sequence[Read]) -> list[SampleBlock]:
+        """Samples completed by consecutive reads: the rows and losses that `decode` of each read gives."""
+        if self._decoder is not None and all(data for data, _ in reads):
+            return self._decoder.feed_reads(reads)
+        return [block for data, arrival_ns in reads for block in self.decode(data, arrival_ns)]
+
     def await_data(
         self, link: Link, timeout_s: float, is_good: Callable[[bytes], object]
     ) -> tuple[bytes, bool]:
         """Read until all is good, or for `timeout_s` of running time; returns it and whether it is good."""
         received, now_s = b"", time.perf_counter()
         deadline_s = now_s + max(timeout_s, _MIN_WAIT_S)
-        while now_s < deadline_s:
+        while now_s < deadline_s and len(received) < _MAX_AWAITED_BYTES:
             data = link.read()
             received += data
             if data and is_good(received):

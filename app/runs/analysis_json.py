@@ -10,15 +10,14 @@ import msgspec
 import numpy as np
 
 from analysis.identification import Identification, ModelSelection, MonteCarlo
-from analysis.plate.friction import PlateFriction
 from analysis.quantities import COVERAGE_FACTOR, BudgetLine, Quantity, ResultWarning, parse_source
-from analysis.record import Record, StandMasses
-from analysis.uncertainty import unstated_gain_warnings
+from analysis.record import Record, StandMasses, unstated_gain_warnings
 from messages.i18n import N_
 from messages.message import Message, joined, message
 
 if TYPE_CHECKING:
     from analysis.classical_estimates import ClassicalEstimates
+    from analysis.plate.friction import PlateFriction
     from app.runs.analysis_request import AnalysisRequest
     from app.runs.metadata import EndMetadata, RunMetadata
     from config.schema import Gauge, GaugeCheck, Gauges
@@ -111,7 +110,7 @@ def json_values(value: Any) -> Any:
     return msgspec.json.decode(msgspec.json.encode(value))
 
 
-def plate_document(plate: PlateFriction | None) -> dict[str, Any] | None:
+def plate_document(plate: "PlateFriction | None") -> dict[str, Any] | None:
     """Friction from the plate alone: each slip, and how friction varies; None where there is none."""
     if plate is None:
         return None

@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Iterator
 from enum import IntEnum
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import NamedTuple
 
 import msgspec
 
@@ -21,6 +21,7 @@ _HEADER = struct.Struct("<BxxxIq")
 _FRONT = struct.Struct("<BxxxIqI")
 _LENGTH_MAX = 1 << 26
 _SEARCHED_BYTES = 1 << 20
+_PIECE_BYTES = 1 << 20  # read at once
 
 
 class RecordKind(IntEnum):
@@ -69,13 +70,19 @@ def encode_record(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WI
 
 def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
     """Records of a journal from byte `start` to its end or first torn record. Raises OSError, ValueError."""
-    with path.open("rb") as file:
+    with path.open("rb", buffering=0) as file:
         if file.read(len(MAGIC)) != MAGIC:
             raise ValueError(f"{path} is not a Slipstand journal")
-        position = file.seek(max(start, len(MAGIC)))
-        while (record := _next(file, position)) is not None:
-            position = record.end
-            yield record
+        place, data = file.seek(max(start, len(MAGIC))), b""
+        while piece := file.read(_PIECE_BYTES):
+            data += piece
+            used = 0
+            for record in _whole_records(data, place):
+                yield record
+                used = record.end - place
+            place, data = place + used, data[used:]
+            if _is_torn(data):
+                return
 
 
 def has_record_behind(path: Path, start: int) -> bool:
@@ -100,18 +107,27 @@ def _is_record(data: bytes, start: int) -> bool:
     return bool(zlib.crc32(data[first : first + length], before) == checksum)
 
 
-def _next(file: IO[bytes], start: int) -> JournalRecord | None:
-    front = file.read(_FRONT.size)
-    if len(front) < _FRONT.size:
-        return None
-    number, length, arrival_ns, checksum = _FRONT.unpack(front)
-    data = file.read(length) if length <= _LENGTH_MAX else b""
-    kind = _KINDS.get(number)
-    if kind is None or len(data) < length:
-        return None
-    if zlib.crc32(data, zlib.crc32(front[: _HEADER.size])) != checksum:
-        return None
-    return JournalRecord(kind, arrival_ns, data, start, start + _FRONT.size + length)
+def _whole_records(data: bytes, place: int) -> Iterator[JournalRecord]:
+    """Records at the begin of `data`, which stand at byte `place` of the journal, up to a torn one."""
+    start, size = 0, len(data)
+    while (first := start + _FRONT.size) <= size:
+        number, length, arrival_ns, checksum = _FRONT.unpack_from(data, start)
+        end = first + length
+        content, kind = data[first:end], _KINDS.get(number)
+        if end > size or kind is None:
+            return
+        if zlib.crc32(content, zlib.crc32(data[start : start + _HEADER.size])) != checksum:
+            return
+        yield JournalRecord(kind, arrival_ns, content, place + start, place + end)
+        start = end
+
+
+def _is_torn(data: bytes) -> bool:
+    """Tell whether `data` begin with a record that more bytes cannot make whole."""
+    if len(data) < _FRONT.size:
+        return False
+    number, length, *_ = _FRONT.unpack_from(data)
+    return number not in _KINDS or length > _LENGTH_MAX or len(data) >= _FRONT.size + length
 
 
 def find_journals(folder: Path) -> Iterator[Path]:

@@ -1,11 +1,13 @@
 """Drill: the disk of a run hangs, as a network share does; `python -m tests.drills.hanging_disk --count 10`.
 
 The folder of the runs is mounted through bindfs, a FUSE file system whose process is stopped: every call on
-the folder then waits. The operator must be told within 2 s, the run end within 10 s, and another run be armed
+the folder then waits. Or only syncs of its files wait, as a library loaded into the engine has them do
+(`preload.c`), while writes go on. The operator must be told within 2 s, the run end within 10 s, and another run be armed
 elsewhere at once. On the folder itself arming must be refused, while samples go on. When the disk is back,
 all samples that were told must be rebuilt.
 """
 
+import contextlib
 import os
 import shutil
 import signal
@@ -17,7 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from app.acquisition.engine_client import EngineClient
-from app.acquisition.journal.recovery import recover_folder
+from app.acquisition.journal.recovery import RecoveryState, recover_folder
 from app.acquisition.messages import (
     Arm,
     Connected,
@@ -34,6 +36,7 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from tests.drills.disk_full import environment
+from tests.drills.preload import SYNC, build_library, has_compiler
 from tests.drills.report import DrillReport, arguments
 from tests.drills.unplug import wait_for
 
@@ -104,7 +107,37 @@ class HangingDisk:
         self._process.send_signal(signal.SIGCONT)
 
 
-def hanging_disk(count: int, folder: Path) -> HangReport:
+class HangingSync:
+    """A folder whose files take writes and no syncs while it hangs; a context manager for an engine's start."""
+
+    def __init__(self, place: Path) -> None:
+        self.folder = place / "share"
+        self.folder.mkdir()
+        self._mark = self.folder / ".hangs"
+        self._library = build_library(place)
+
+    def __enter__(self) -> "HangingSync":
+        self._environment = contextlib.ExitStack()
+        self._environment.enter_context(environment("LD_PRELOAD", str(self._library)))
+        self._environment.enter_context(environment(SYNC, str(self._mark)))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.go_on()
+        self._environment.close()
+
+    def hang(self) -> None:
+        self._mark.touch()
+
+    def go_on(self) -> None:
+        self._mark.unlink(missing_ok=True)
+
+
+Disk = HangingDisk | HangingSync
+KINDS: dict[str, type[HangingDisk] | type[HangingSync]] = {"disk": HangingDisk, "sync": HangingSync}
+
+
+def hanging_disk(count: int, folder: Path, kind: str = "disk") -> HangReport:
     """Let the disk hang in each of `count` runs in an empty folder."""
     report = HangReport()
     options = SimulatedStandOptions(rate_hz=RATE_HZ, seed=1)
@@ -116,7 +149,7 @@ def hanging_disk(count: int, folder: Path) -> HangReport:
             place.mkdir()
             fallback = place / "fallback"
             with (
-                HangingDisk(place) as disk,
+                KINDS[kind](place) as disk,
                 environment("XDG_DATA_HOME", str(fallback)),
                 EngineClient.start(port, *files) as engine,
             ):
@@ -129,7 +162,7 @@ def hanging_disk(count: int, folder: Path) -> HangReport:
 
 
 def _one_run(
-    disk: HangingDisk, engine: EngineClient, place: Path, fallback: Path, report: HangReport
+    disk: Disk, engine: EngineClient, place: Path, fallback: Path, report: HangReport
 ) -> None:
     wait_for(engine, Connected)
     run = RunSettings(str(disk.folder), series="1FFM0", trigger="none", duration_s=60.0)
@@ -187,6 +220,8 @@ def _check_rebuilt(share: Path, fallback: Path, ended: RunEnded, report: HangRep
     samples = 0
     for folder in (share, fallback):
         for recovery in recover_folder(folder):
+            if recovery.state is RecoveryState.EMPTY:  # nothing came after the disk was left
+                continue
             if not recovery.run:
                 raise ValueError(f"{recovery.journal}: {recovery.state}, {recovery.message}")
             samples += len(open_run(Path(recovery.run)))
@@ -199,13 +234,16 @@ def _check_rebuilt(share: Path, fallback: Path, ended: RunEnded, report: HangRep
 def main() -> int:
     """Run the drill and print what came of it."""
     given = arguments(__doc__, 10).parse_args()
-    if not has_bindfs():
-        sys.stdout.write("bindfs is absent, or may not mount here\n")
+    if not has_bindfs() or not has_compiler():
+        sys.stdout.write("bindfs or cc is absent, or bindfs may not mount here\n")
         return 1
-    with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
-        report = hanging_disk(given.count, Path(folder))
-    sys.stdout.write(f"{report}\n")
-    return 1 if report.faults else 0
+    faults = 0
+    for kind in KINDS:
+        with tempfile.TemporaryDirectory(prefix="slipstand-drill-") as folder:
+            report = hanging_disk(given.count, Path(folder), kind)
+        sys.stdout.write(f"{kind}: {report}\n")
+        faults += len(report.faults)
+    return 1 if faults else 0
 
 
 if __name__ == "__main__":

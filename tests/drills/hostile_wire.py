@@ -3,7 +3,7 @@
 A proxy stands between a simulated stand and the engine, and changes what comes while a run is recorded:
 frames twice, shuffled, one in a thousand, with random number or time and a right checksum, a megabyte instead
 of them, the identity of another device, nothing at all. The stand itself sends at double or half, ten times
-or a thousandth of the rate that it states. Each run must go on or end with one line, no good row be one that
+or a thousandth of the rate that it states, or gives an identity without end. Each run must go on or end with one line, no good row be one that
 was never sent, and the engine's memory stay bounded.
 """
 
@@ -33,7 +33,7 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from drivers.crc import crc16
-from drivers.devices.slipstand_binary.codec import SYNC, frame_length, samples_per_frame
+from drivers.devices.slipstand_binary.codec import IDENTIFY, SYNC, frame_length, samples_per_frame
 from tests.drills.kill_engine import ask
 from tests.drills.report import DrillReport, chosen_ways, run_ways
 from tests.drills.sent import Sent
@@ -72,8 +72,13 @@ WIRES: dict[str, Change] = {
     "mute": lambda _frames, _: [],
 }
 RATES = {"double rate": 1.0, "half rate": -0.5, "tenfold rate": 9.0, "thousandth rate": -0.999}
+IDENTITIES = {
+    "endless identity": b"slipstand-fw " + b"A" * (1 << 20) + b" 500 2\n",
+    "endless noise": random.Random(1).randbytes(1 << 20) * 64,
+}
+"""What comes instead of the answer to the question who the device is."""
 ADDRESSES = ("silent port", "unknown name")
-WAYS = (*WIRES, *RATES, *ADDRESSES)
+WAYS = (*WIRES, *RATES, *IDENTITIES, *ADDRESSES)
 
 
 @dataclass(slots=True)
@@ -91,10 +96,10 @@ class WireReport(DrillReport):
 class Proxy(threading.Thread):
     """Passes bytes between a device and its reader, and changes those to the reader once it is told to."""
 
-    def __init__(self, device: str, change: Change, seed: int) -> None:
+    def __init__(self, device: str, change: Change, seed: int, identity: bytes = b"") -> None:
         super().__init__(name="proxy", daemon=True)
         self.is_changing = threading.Event()
-        self._change, self._chance = change, random.Random(seed)
+        self._change, self._chance, self._identity = change, random.Random(seed), identity
         host, _, port = device.removeprefix("socket://").partition(":")
         self._device = (host, int(port))
         self._listener = socket.create_server(("127.0.0.1", 0))
@@ -117,7 +122,10 @@ class Proxy(threading.Thread):
     def _pass_commands(self, source: socket.socket, target: socket.socket) -> None:
         try:
             while data := source.recv(1 << 16):
-                target.sendall(data)
+                if self._identity and IDENTIFY in data:
+                    source.sendall(self._identity)
+                else:
+                    target.sendall(data)
         except OSError:
             pass
         target.close()
@@ -179,7 +187,8 @@ def _one_run(way: str, folder: Path, seed: int, report: WireReport) -> None:
     rate_error = RATES.get(way, 0.0)
     options = SimulatedStandOptions(rate_hz=RATE_HZ, seed=1, tcp_port=0, rate_error=rate_error)
     with SimulatedStand.start(options) as stand:
-        proxy = Proxy(stand.port, WIRES.get(way, lambda frames, _: frames), seed)
+        change = WIRES.get(way, lambda frames, _: frames)
+        proxy = Proxy(stand.port, change, seed, IDENTITIES.get(way, b""))
         try:
             with _engine(proxy.url) as engine:
                 event = _await(engine, (Failed, Connected))

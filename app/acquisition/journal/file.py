@@ -92,12 +92,14 @@ class JournalFile:
 
     def begin_sync(self) -> None:
         """Begin a sync in a thread unless one is under way. Raises OSError where no folder takes it."""
-        if self._sync is None or not self._sync.is_alive():
+        if self._is_made and (self._sync is None or not self._sync.is_alive()):
             self._finish_sync()
             self._sync = FileSync(self._file.fileno())
 
     def sync(self) -> None:
         """Wait until all is on disk. Raises OSError where no folder takes it."""
+        if not self._is_made:
+            return
         self._finish_sync()
         try:
             sync_descriptor(self._file.fileno())

@@ -58,7 +58,7 @@ class Journal:
         """Since when (s) the disk is at which record; an empty one for the last sync."""
         self.left: Path | None = None
         """Journal on a disk that hangs, with all that came until then."""
-        self._thread = self._start(file)
+        self._start()
 
     @property
     def path(self) -> Path:
@@ -73,15 +73,17 @@ class Journal:
         return time.perf_counter() - min(began) if began else 0.0
 
     def leave_hanging_disk(self) -> bool:
-        """Go on in a fallback folder if the disk is at one record still; what it has stays there."""
+        """Go on in a fallback folder if the disk is at one record or sync still; what it has stays there."""
         with self._turn:
-            if self._task is None or self.left is not None:
+            task, old = self._task, self._file
+            if self.left is not None or (task is None and old.sync_began_s is None):
                 return False
-            (_, record), old, self._task = self._task, self._file, None
-            self.left = old.path
-            self._file = file = old.successor()
+            self._task, self.left, self._file = None, old.path, old.successor()
+            if task is not None:  # its thread hangs
+                self._start(task[1])
+            else:
+                threading.Thread(target=_close, args=(old,), name="journal left", daemon=True).start()
         _log.error("the disk of %s hangs", old.path)
-        self._thread = self._start(file, record)
         return True
 
     @property
@@ -144,29 +146,27 @@ class Journal:
         if self._failure is not None:
             raise _error(self.path, self._failure)
 
-    def _start(self, file: JournalFile, first: bytes | None = None) -> threading.Thread:
-        thread = threading.Thread(target=self._write, args=(file, first), name="journal", daemon=True)
-        thread.start()
-        return thread
+    def _start(self, first: bytes | None = None) -> None:
+        self._thread = threading.Thread(target=self._write, args=(first,), name="journal", daemon=True)
+        self._thread.start()
 
-    def _write(self, file: JournalFile, first: bytes | None) -> None:
+    def _write(self, first: bytes | None) -> None:
         """Thread: append records and sync each tenth of a second, until the end is queued."""
+        file = self._file
         try:
             if first is not None:
-                self._do(file, first)
-            while not self._is_ending and self._write_for(file, self._SYNC_S):
+                self._do(first)
+            while not self._is_ending and self._write_for(self._SYNC_S):
                 pass
             if self._is_ending:
-                self._do(file, b"")
-            file.close()
+                self._do(b"")
+            self._file.close()
         except _LeftError:
-            with contextlib.suppress(OSError):
-                file.close()
-            file.release()
+            _close(file)
         except Exception as error:  # a journal that ends unseen would be taken for a slow disk
             _log.error("the journal %s has failed: %s", self.path, error)
             with contextlib.suppress(OSError):
-                file.close()
+                self._file.close()
             self._failure = (
                 error if isinstance(error, OSError) else OSError(f"{type(error).__name__}: {error}")
             )
@@ -178,32 +178,40 @@ class Journal:
         self._is_ending = record is None
         return record
 
-    def _write_for(self, file: JournalFile, duration_s: float) -> bool:
+    def _write_for(self, duration_s: float) -> bool:
         record = self._next()
         deadline = time.perf_counter() + duration_s
         while record is not None:
-            self._do(file, record)
+            self._do(record)
             try:
                 record = self._next(max(0.0, deadline - time.perf_counter()))
             except queue.Empty:
                 break
         if record is None:
             return False
-        file.begin_sync()
+        self._file.begin_sync()
         return True
 
-    def _do(self, file: JournalFile, record: bytes) -> None:
+    def _do(self, record: bytes) -> None:
         """Append a record; an empty one syncs. Raises OSError, _LeftError once another thread does it."""
-        self._task = time.perf_counter(), record
+        with self._turn:
+            file, self._task = self._file, (time.perf_counter(), record)
         if record:
             file.append(record)
         else:
             file.sync()
         with self._turn:
-            if self._file is not file:
+            if threading.current_thread() is not self._thread:
                 raise _LeftError
             self.written += len(record)
             self._task = None
+
+
+def _close(file: JournalFile) -> None:
+    """Close a journal that was left and release its lock, once its disk goes on."""
+    with contextlib.suppress(OSError):
+        file.close()
+    file.release()
 
 
 class _LeftError(Exception):

@@ -14,6 +14,7 @@ from app.acquisition.journal.records import (
     JournalSummary,
     Known,
     Mark,
+    MetadataRecord,
     Opened,
     decode_metadata_record,
     end_metadata,
@@ -77,47 +78,52 @@ class Replay:
         yield from (_numbered(read, self._offset or 0) for read in waiting)
 
     def _groups(self, records: Iterable[JournalRecord]) -> Iterator[list[JournalRecord]]:
-        """Single reads until the run is begun, since it may begin after any; then those between two notes."""
+        """Single reads until the run is begun, since it may begin after any; then those of a checkpoint."""
         reads: list[JournalRecord] = []
         for record in records:
-            is_read = record.kind is RecordKind.WIRE
-            if is_read:
+            if record.kind is RecordKind.WIRE:
                 reads.append(record)
-            if reads and (not is_read or not self._is_in_run or len(reads) == _READS_MAX):
-                yield reads
-                reads = []
-            if not is_read:
-                self._on_metadata(record.data)
+                if not self._is_in_run or len(reads) == _READS_MAX:
+                    yield reads
+                    reads = []
+                continue
+            fact = decode_metadata_record(record.data)
+            counted = self._counted_reads(fact, len(reads))
+            if counted:
+                yield reads[:counted]
+                reads = reads[counted:]
+            self._on_metadata(fact)
         if reads:
             yield reads
 
+    def _counted_reads(self, fact: MetadataRecord, waiting: int) -> int:
+        """How many of the `waiting` reads a metadata record counts."""
+        if not isinstance(fact, Mark | Opened):
+            return 0
+        return waiting if fact.reads is None else min(max(fact.reads - self._reads, 0), waiting)
+
     def _replayed(self, reads: list[JournalRecord]) -> ReplayedReads:
-        """Decode each read with its own time, then calibrate the samples of all together, for speed."""
+        """Decode consecutive reads and calibrate their samples."""
         is_in_run = self._is_in_run
         try:
-            blocks = [block for read in reads for block in self._decoded(read)]
+            blocks = self._source.decode_reads([(read.data, read.arrival_ns) for read in reads])
         except DriverError as error:
             template = N_("{path}: its bytes make no sense ({error}). It stays as it is")
             raise RecoveryError(template, path=self._summary.path, error=error) from None
-        before, self._losses = self._losses, replace(self._source.losses)
-        rows = calibrate(_joined(blocks), self._summary.header.metadata.gauges) if blocks else None
-        return ReplayedReads(rows, self._losses - before, reads[0].start, is_in_run)
-
-    def _decoded(self, read: JournalRecord) -> list[SampleBlock]:
-        blocks = list(self._source.decode(read.data, read.arrival_ns))
         samples = self._counted[-1][1] if self._counted else 0
         if blocks:
             samples = blocks[-1].first_index + len(blocks[-1])
-        self._reads += 1
+        self._reads += len(reads)
         self._counted.append((self._reads, samples))
-        return blocks
+        before, self._losses = self._losses, replace(self._source.losses)
+        rows = calibrate(_joined(blocks), self._summary.header.metadata.gauges) if blocks else None
+        return ReplayedReads(rows, self._losses - before, reads[0].start, is_in_run)
 
     def skew(self, first_index: int, end_index: int) -> Skew | None:
         offset = self._offset or 0
         return self._source.skew(first_index - offset, end_index - offset)
 
-    def _on_metadata(self, data: bytes) -> None:
-        record = decode_metadata_record(data)
+    def _on_metadata(self, record: MetadataRecord) -> None:
         if isinstance(record, Opened) and record.reads is None:
             self._opened_after = self._reads
         elif isinstance(record, Mark) and (samples := self._samples_after(record.reads)):
@@ -126,10 +132,11 @@ class Replay:
             self._offset = ahead if self._offset is None else self._offset
 
     def _samples_after(self, reads: int | None) -> int:
-        """Samples of so many reads, of all until now for None; 0 where there are none to compare."""
-        while len(self._counted) > 1 and self._counted[0][0] < (self._reads if reads is None else reads):
+        """Samples of so many reads, of all until now for None; 0 where that number is not known."""
+        wanted = self._reads if reads is None else reads
+        while len(self._counted) > 1 and self._counted[0][0] < wanted:
             self._counted.popleft()
-        return self._counted[0][1] if self._counted else 0
+        return self._counted[0][1] if self._counted and self._counted[0][0] == wanted else 0
 
 
 def _joined(blocks: list[SampleBlock]) -> SampleBlock:

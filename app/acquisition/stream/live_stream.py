@@ -28,12 +28,17 @@ from drivers.packets import MAX_BLOCK_ROWS
 from drivers.port import OpenPort
 from drivers.samples import ChannelFilter, DeviceIdentity, Losses
 from drivers.stream import ReaderEndReason, SampleSource
+from messages.i18n import N_
 from messages.message import EMPTY, Message, as_message, message, message_of
 
 _log = logging.getLogger(__name__)
 
 PATIENCE_S = 10.0  # a run waits so long for a lost device; the search goes on
 _BYTES_PER_SAMPLE = 25.0  # a line of text with its time and two readings; assumed before anything has come
+_STARTED_ANEW = N_(
+    "the device started anew while it sent: what is missing until then is estimated by this computer's clock"
+    " and marked. Check its power and its cable"
+)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -245,6 +250,8 @@ class LiveStream:
         added = self.losses - before
         if added.restarts:
             self._rate_monitor.restart()
+            if not self._is_returning:
+                self._events.append(StreamNotice(message(_STARTED_ANEW)))
         if rows:
             self._on_rows(rows[-1].end_index - 1, read.arrival_ns, added)
         self._stall_detector.add_read(read.arrival_ns, read.data, has_samples=bool(rows))

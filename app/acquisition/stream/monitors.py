@@ -28,6 +28,11 @@ _HOLES_FRACTION = 0.1  # a stream with more of such holes gives no rate: most of
 _SETTLING_S = 0.5  # what comes first was held while the device was started: its arrival times are not used
 _WINDOWS = 3
 """Successive windows that must agree on a wrong rate; on a busy host, windows differ."""
+_QUICK = 1.5
+_QUICK_WINDOW_S = 0.1
+_QUICK_WINDOW_SAMPLES = 20.0
+"""A device is known early to send too quickly where it does so, by the factor, in `_WINDOWS` such windows."""
+_LATE_S = 0.05  # standard uncertainty of a span of few reads, which come late
 _BEHIND_S = 0.3  # delays of host, port and adapter change by less
 _AHEAD_S = 0.1
 
@@ -49,6 +54,9 @@ class RateMonitor:
         self._recent: ClockEstimate | None = None
         self._recent_ns = self._latest_ns = 0
         self._is_wrong = False
+        self._quick_window_s = max(_QUICK_WINDOW_S, _QUICK_WINDOW_SAMPLES / rate_hz)
+        self._quick: ClockEstimate | None = None
+        """Rate of a device that sends so much too quickly that a moment proves it."""
         self._first_ns: int | None = None
         self._begin()
 
@@ -70,7 +78,7 @@ class RateMonitor:
             and (self._known is None or _is_better(present, self._known))
         ):
             self._known = present
-        return self._known
+        return self._known or self._quick
 
     def recent(self) -> ClockEstimate | None:
         """As `estimate`, but up to a second old, because an estimate costs much."""
@@ -84,8 +92,12 @@ class RateMonitor:
         self._follow_delay(index, before_ns)
         if self._first_ns is None:
             self._first_ns = self._window_ns = arrival_ns
-        if arrival_ns - self._first_ns < _SETTLING_S * 1e9:
-            return EMPTY
+        if self._quick is None:
+            self._measure_quickness(index)
+            if self._quick is not None:
+                return rate_note(self._quick.scale, self._rate_hz)
+            if arrival_ns - self._first_ns < _SETTLING_S * 1e9:
+                return EMPTY
         self._whole.add(index, arrival_ns)
         if arrival_ns - before_ns > self._hole_ns:
             self._holes_ns += arrival_ns - before_ns
@@ -102,6 +114,7 @@ class RateMonitor:
         self._first_ns = None
         self._delay_s, self._least_delay_s = 0.0, math.inf
         self._window_ns = self._holes_ns = 0
+        self._quick_windows: deque[tuple[int, int]] = deque(maxlen=_WINDOWS + 1)
 
     def _begin_window(self, arrival_ns: int) -> None:
         self._window, self._window_ns = ClockFit(self._rate_hz), arrival_ns
@@ -117,7 +130,8 @@ class RateMonitor:
         was_wrong = self._is_wrong
         is_same = len(self._windows) == _WINDOWS and all(starmap(_agree_on_wrong, pairwise(self._windows)))
         self._is_wrong = is_same and self._is_no_delay(latest)
-        return rate_note(latest.scale, self._rate_hz) if self._is_wrong and not was_wrong else EMPTY
+        is_told = was_wrong or self._quick is not None
+        return rate_note(latest.scale, self._rate_hz) if self._is_wrong and not is_told else EMPTY
 
     def _follow_delay(self, index: int, before_ns: int) -> None:
         """Measure how much later the newest sample came than it was due at the nominal rate."""
@@ -126,6 +140,18 @@ class RateMonitor:
         first, begun_ns = self._begun
         self._delay_s = (self._latest_ns - begun_ns) * 1e-9 - (index - first) / self._rate_hz
         self._least_delay_s = min(self._least_delay_s, self._delay_s)
+
+    def _measure_quickness(self, index: int) -> None:
+        """Samples that were held somewhere come quickly too, but within one window, or late."""
+        begins, latest = self._quick_windows, (index, self._latest_ns)
+        if not begins or latest[1] - begins[-1][1] > self._quick_window_s * 1e9:
+            begins.append(latest)
+        if len(begins) <= _WINDOWS or self._delay_s > -_AHEAD_S:
+            return
+        if min(starmap(_rate_hz, pairwise(begins))) > _QUICK * self._rate_hz:
+            rate_hz = float(f"{_rate_hz(begins[0], begins[-1]):.2g}")
+            scale, span_s = self._rate_hz / rate_hz, (begins[-1][1] - begins[0][1]) * 1e-9
+            self._quick = ClockEstimate(rate_hz, scale, scale * _LATE_S / span_s, span_s)
 
     def _is_no_delay(self, estimate: ClockEstimate) -> bool:
         """Tell whether a wrong rate is more than samples that come later and later, or catch up."""
@@ -139,6 +165,11 @@ class RateMonitor:
             return True
         halves = self._whole.halves()
         return self._is_no_delay(whole) and halves is not None and _agree(*halves)
+
+
+def _rate_hz(begin: tuple[int, int], end: tuple[int, int]) -> float:
+    """Samples a second from one index and arrival (ns) to another."""
+    return (end[0] - begin[0]) / (end[1] - begin[1]) * 1e9
 
 
 def is_rate_wrong(estimate: ClockEstimate | TimeBase) -> bool:

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from multiprocessing import resource_tracker
+from multiprocessing.context import BaseContext
 from multiprocessing.synchronize import Lock
 from typing import Any, ClassVar, Generic, TypeVar
 
@@ -31,6 +32,7 @@ _log = logging.getLogger(__name__)
 
 _SERIAL_RUNS = 8
 """Up to this many runs are done before worker processes would have started (docs/benchmarks.md)."""
+_ANALYSIS = "app.runs.batch.loaded_analysis"
 _CLUSTER_TIMEOUT_S = 5.0  # a scheduler in the same network answers in less than 1 s
 _QUEUED_PER_WORKER = 8  # items handed over for each worker: one slow run must not leave the others idle
 _POLL_S = 0.2  # Windows delivers Ctrl-C between two waits only
@@ -90,7 +92,7 @@ def open_executor(options: ExecutorOptions, runs: int) -> Iterator[Executor]:
     if options.dask:
         executor = DaskExecutor(options.dask)
     else:
-        executor = Executor() if jobs <= 1 else ProcessExecutor(jobs, load_analysis)
+        executor = Executor() if jobs <= 1 else ProcessExecutor(jobs, _ANALYSIS)
     try:
         yield executor
     except BaseException:
@@ -137,15 +139,17 @@ def ordered_map(
 class ProcessExecutor(Executor):
     """Worker processes on this computer, started with the first item. None outlives this process.
 
-    `prepare` is called by each process before its first item, one process after another: at the very first
-    start one compiles, and the others load the result.
+    `preload` is a module that each process imports before its first item, one process after another: at the
+    very first start one compiles, and the others load the result. On Linux workers are forked from a process
+    that imported it, has no thread and stays until this one ends; elsewhere libraries of the system do not
+    stand a fork.
     """
 
     in_process = False
 
-    def __init__(self, workers: int, prepare: Callable[[], None]) -> None:
+    def __init__(self, workers: int, preload: str = "") -> None:
         self._workers = workers
-        self._prepare = prepare
+        self._preload = preload
         self._executor: ProcessPoolExecutor | None = None
         self._lifeline: tuple[PipeEnd, ...] = ()
 
@@ -176,15 +180,29 @@ class ProcessExecutor(Executor):
 
     def _started(self) -> ProcessPoolExecutor:
         if self._executor is None:
-            context = multiprocessing.get_context("spawn")
+            context = self._context()
             self._lifeline = context.Pipe(duplex=False)
             self._executor = ProcessPoolExecutor(
                 self._workers,
                 mp_context=context,
                 initializer=_begin,
-                initargs=(self._lifeline[0], context.Lock(), self._prepare),
+                initargs=(self._lifeline[0], context.Lock(), self._preload),
             )
         return self._executor
+
+    def _context(self) -> BaseContext:
+        if sys.platform == "linux" and self._preload:
+            context = multiprocessing.get_context("forkserver")
+            context.set_forkserver_preload([self._preload])
+            from multiprocessing import forkserver  # Windows has none
+
+            try:
+                forkserver.ensure_running()
+            except OSError as error:  # no folder takes the socket that it is asked by
+                _log.warning("workers are not forked: %s", error)
+            else:
+                return context
+        return multiprocessing.get_context("spawn")
 
 
 class DaskExecutor(Executor):
@@ -247,13 +265,6 @@ def program_version() -> str:
     return __version__
 
 
-def load_analysis() -> None:
-    """Load what an analysis needs, or compile it. Called in worker processes."""
-    from analysis.identify import warm_up
-
-    warm_up()
-
-
 def _submit(executor: Executor, work: Callable[[Item], Answer], item: Item) -> "Future[Answer]":
     """Hand over one item; the refusal of an executor becomes a failed future."""
     try:
@@ -298,10 +309,11 @@ def _answer(item: Item, future: "Future[Answer]") -> Answer | FailedItem[Item]:
     return FailedItem(item, message("its worker failed ({kind}: {text})", kind=kind, text=text))
 
 
-def _begin(lifeline: PipeEnd, one_at_a_time: Lock, prepare: Callable[[], None]) -> None:
+def _begin(lifeline: PipeEnd, one_at_a_time: Lock, preload: str) -> None:
     exit_with_parent(lifeline)
-    with one_at_a_time:
-        prepare()
+    if preload:
+        with one_at_a_time:
+            importlib.import_module(preload)
 
 
 def _do(work: Callable[[Item], Answer], item: Item) -> Answer:

@@ -30,7 +30,8 @@ SAMPLE_BYTES = 8  # two int32
 MAX_SAMPLES = 32
 MIN_FRAME_BYTES = HEADER_BYTES + SAMPLE_BYTES + 2
 
-_IDENTITY = re.compile(rb"slipstand-fw (\S+) (\d+(?:\.\d+)?) (\d+)\r?\n")
+_IDENTITY = re.compile(rb"slipstand-fw (\S{1,100}) (\d{1,9}(?:\.\d{1,9})?) (\d{1,9})\r?\n")
+_ENDLESS_IDENTITY = re.compile(rb"slipstand-fw [!-~]{101}")
 _FRAMES_PER_S = 200.0
 """Frames a second below 6.4 kHz: a sample waits for its frame for 5 ms at most."""
 _MAX_RATE_HZ = 1_000_000
@@ -71,9 +72,16 @@ def encode_identity(identity: FirmwareIdentity) -> bytes:
 
 
 def find_identity(received: bytes) -> FirmwareIdentity | None:
-    """Identity line in `received`; None while it is incomplete. Raises ProtocolError without 2 channels."""
+    """Identity line in `received`; None while it is incomplete.
+
+    Raises ProtocolError without 2 channels, and for a version that does not end.
+    """
     match = _IDENTITY.search(received)
     if match is None:
+        if _ENDLESS_IDENTITY.search(received):
+            raise ProtocolError(
+                "the device states a version of more than 100 characters: flash its firmware anew"
+            )
         return None
     identity = FirmwareIdentity(match[1].decode("ascii", "replace"), float(match[2]), int(match[3]))
     if identity.channels != 2:
@@ -134,15 +142,18 @@ class FrameDecoder(PacketDecoder):
     between can have held are damaged, the others missing. A sequence that goes back, leaps by more than
     `max_gap_s`, or contradicts the host's clock after a broken connection is a restart of the device: the
     rows until it are estimated from the host's clock (`missing_estimated`), and the index goes on. A frame
-    that comes twice counts once, and one that comes late not at all. Losses before the first and after the
-    last good frame cannot be known.
+    that comes twice counts once, and one that comes late not at all; one with the number of a frame of the
+    last quarter of a second, and other contents, is a restart. Losses before the first and after the last
+    good frame cannot be known.
     """
 
     _piece_bytes = 1 << 18
+    _is_timed_at_restarts_only = True
 
     def __init__(self, rate_hz: float, max_gap_s: float = MAX_GAP_S) -> None:
         super().__init__(STATE, rate_hz, max_gap_s)
         self._state["max_gap"] = self._max_gap
+        self._recent = np.zeros(_RECENT_FRAMES, dtype=RECENT)
 
     def expect_restart(self) -> None:
         self._state["garbage"] += len(self._unfinished)
@@ -156,7 +167,9 @@ class FrameDecoder(PacketDecoder):
         packets = np.empty(found, dtype=PACKET)
         counts = np.empty((samples, 2), dtype=np.int32)
         self._state["restart_rows"] = self._rows_since(arrival_ns, samples)
-        found, samples = count_frames(buffer, frames[:found], used, self._state, packets, counts)
+        found, samples = count_frames(
+            buffer, frames[:found], used, self._state, self._recent, packets, counts
+        )
         return packets[:found], counts[:samples]
 
 
@@ -191,12 +204,17 @@ _OVERLOADS = int(FrameFlags.OVERLOAD_TABLE | FrameFlags.OVERLOAD_RELATIVE)
 _OVERLOAD_SHIFT = 2
 """Shifts the overload bits of the frame onto those of `SampleStatus`."""
 
-_LATE_S = 0.25  # a device that restarts is away for longer
+_LATE_S = 0.25
+_RECENT_FRAMES = 4096  # a power of two; more than a device at 16 kHz or below sends within `_LATE_S`
 _LATE_TOLERANCE_S = 0.01
 
 STATE = state_type("max_gap next_seq last_seq last_t_us packet_us garbage", "")
 """What the decoder keeps between calls: the longest step of the sequence that is no restart; the sequence
 number that follows without a loss; sequence, time and unwrapped time (us) of the last frame; bytes since."""
+
+
+RECENT = record_type("seq checksum", "")
+"""A frame that came lately: its sequence number, plus one, and its checksum, which stands for its contents."""
 
 
 @compiled
@@ -233,18 +251,28 @@ def scan_frames(buffer: UInt8s, frames: Records) -> tuple[int, int, int]:
 
 @compiled
 def count_frames(
-    buffer: UInt8s, frames: Records, used: int, states: Records, packets: Records, counts: Int32s
+    buffer: UInt8s,
+    frames: Records,
+    used: int,
+    states: Records,
+    recent: Records,
+    packets: Records,
+    counts: Int32s,
 ) -> tuple[int, int]:
     """Fill packets (frames,) and counts (samples, 2) of `frames`; returns how many.
 
-    `used` bytes of the buffer will not be passed again; `states` (1,) is updated.
+    `used` bytes of the buffer will not be passed again; `states` (1,) and `recent` are updated.
     """
     state = states[0]
     found = sample = end = 0
     for frame in frames:
         _discard(state, frame.start - end)
         end = frame.end
-        if state.started and not state.restarting and _is_late(state, frame):
+        same = recent[(frame.seq // frame.n) & (_RECENT_FRAMES - 1)]
+        checksum = np.int64(buffer[end - 2]) | np.int64(buffer[end - 1]) << 8
+        is_other = same.seq == frame.seq + 1 and same.checksum != checksum
+        same.seq, same.checksum = frame.seq + 1, checksum
+        if state.started and not state.restarting and not is_other and _is_late(state, frame):
             state.repeated += 1
             state.discarded_bytes += end - frame.start
             continue
@@ -280,7 +308,10 @@ def _discard(state: Record, size: int) -> None:
 
 @inlined
 def _is_late(state: Record, frame: Record) -> bool:
-    """Tell whether a frame came before, or after ones that were sent later: its rows are counted by then."""
+    """Tell whether a frame may have come before, or after ones that were sent later.
+
+    Its rows are counted by then.
+    """
     behind_s = ((state.last_seq - frame.seq) & _U32) * state.period_s
     behind_by_time_s = ((state.last_t_us - frame.t_us) & _U32) * 1e-6
     is_late: bool = behind_s <= _LATE_S and abs(behind_by_time_s - behind_s) <= _LATE_TOLERANCE_S

@@ -20,6 +20,7 @@ from app.runs.metadata import EndMetadata
 from app.runs.writer import write_run
 from messages.message import EMPTY
 from tests.app.acquisition.test_recording import Bench, RememberingWriter, answer
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
@@ -73,6 +74,33 @@ def test_a_journal_goes_on_elsewhere_with_what_a_hanging_disk_did_not_take(tmp_p
     old.join(10.0)
     assert data(path) == [b"one"]
     assert not is_being_recorded(path)
+    journal.release()
+
+
+def test_a_journal_goes_on_elsewhere_where_syncs_alone_hang(tmp_path, monkeypatch):
+    path, other = tmp_path / "run.journal", tmp_path / "other"
+    journal = Journal(create_journal_file(path, FIRST, [other]))
+    is_asked, is_there, is_left = threading.Event(), threading.Event(), threading.Event()
+
+    def sync(_descriptor: int) -> None:
+        if not is_left.is_set():
+            is_asked.set()
+            is_there.wait(60.0)
+
+    monkeypatch.setattr("app.acquisition.journal.file.sync_descriptor", sync)
+    journal.append(b"one", 1)
+    assert is_asked.wait(10.0)
+    wait_until(lambda: journal._task is None)
+    assert journal.stalled_s > 0.0
+    assert journal.leave_hanging_disk()
+    is_left.set()
+    assert journal.stalled_s == 0.0
+    journal.append(b"two", 2)
+    journal.close()
+    assert (data(path), data(journal.path)) == ([b"one"], [b"two"])
+    assert is_being_recorded(path), "the disk may still sync it"
+    is_there.set()
+    wait_until(lambda: not is_being_recorded(path))
     journal.release()
 
 

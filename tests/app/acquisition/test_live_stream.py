@@ -71,7 +71,7 @@ class Wire:
         answer, self._answer = self._answer, b""
         if answer and self._device.says != "nothing":
             return answer
-        first, self._next = self._next, self._device.frames
+        first, self._next = min(self._next, self._device.frames), self._device.frames
         frames = self._next - first
         if self._device.says == "nothing" or frames <= 0:
             return b""
@@ -257,6 +257,14 @@ def test_a_wrong_rate_is_said_while_it_lasts():
     (noticed,) = [news for news in listener.news if isinstance(news, StreamNotice)]
     assert "instead of 1000: check its rate" in str(noticed.message)
     assert listener.stream.recent_clock().rate_hz == pytest.approx(1050.0, rel=0.01)
+
+
+def test_a_device_that_restarts_while_it_is_read_is_told_of(device, listener):
+    device.born_ns = host_ns()
+    listener.listen(lambda: listener.heard(StreamNotice))
+    (noticed,) = [news for news in listener.news if isinstance(news, StreamNotice)]
+    assert "started anew" in str(noticed.message)
+    assert listener.stream.losses.restarts == 1
 
 
 def test_a_stream_that_is_closed_while_its_device_is_away_leaves_nothing(device, listener):

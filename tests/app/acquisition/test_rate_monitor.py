@@ -118,3 +118,22 @@ def test_a_stream_that_came_late_for_the_most_part_tells_no_clock(every_s, is_kn
     assert (estimate is not None) == is_known
     if estimate is not None:
         assert estimate.scale == pytest.approx(1.0, abs=1e-4)
+
+
+def test_a_tenfold_rate_is_said_within_half_a_second_and_known():
+    pace, said = RateMonitor(RATE_HZ, 0), []
+    for index in range(10, 4000, 10):
+        note = pace.add(index, round((0.1 + index / (10 * RATE_HZ)) * 1e9))
+        said += [str(note)] if note else []
+    assert said == [
+        "the device sends 10000 samples a second instead of 1000: check its rate; the analysis allows for it"
+    ]
+    clock = pace.estimate()
+    assert clock.scale == pytest.approx(0.1, abs=2 * clock.scale_standard_uncertainty)
+
+
+@pytest.mark.parametrize("held_s", [0.5, 5.0])
+def test_what_was_held_and_comes_at_once_is_no_higher_rate(held_s):
+    pace = RateMonitor(RATE_HZ, 0)
+    for index in range(10, 20_000, 10):
+        assert not pace.add(index, round(max(0.02 + index * 1e-6, index / RATE_HZ - held_s) * 1e9))

@@ -425,3 +425,14 @@ def test_a_run_keeps_a_hundred_notes_and_counts_the_others(tmp_path):
     assert "for the 99th time" in text
     assert "for the 100th time" not in text
     assert text.endswith("50 further notes are left out")
+
+
+def test_a_fault_that_ends_the_run_and_its_file_is_told_once(tmp_path):
+    """The writer gives the same error to the rows that end the run and to its closing."""
+    error = DiskFullError("the disk is full")
+    bench = Bench(tmp_path, writer=RememberingWriter(append_error=error, open_error=error))
+    bench.play(RELEASED + 200)
+    bench.recording.end(EndReason.DISK_FULL, message("the disk is full"))
+    ended = bench.ended()
+    assert ended.ended is EndReason.DISK_FULL
+    assert str(ended.message).count("the disk is full") == 1

@@ -93,10 +93,8 @@ def noted(*given):
     held.append(signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, set()))
     return answer
 executors.ProcessPoolExecutor.submit = noted
-def prepare():
-    pass
 if __name__ == "__main__":
-    executor = executors.ProcessExecutor(1, prepare)
+    executor = executors.ProcessExecutor(1)
     executor.submit(abs, -1).result()
     executor.close(now=True)
     print(held, signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, set()))

@@ -172,7 +172,7 @@ def test_a_process_that_dies_fails_its_task_and_the_next_goes_on(answers: Answer
 
 def keep_a_crew(report: ReportProgress) -> None:
     """Wait with two processes that wait too; the numbers of all three are the progress."""
-    crew = ProcessExecutor(2, nothing)
+    crew = ProcessExecutor(2)
     try:
         crew.submit(nothing_of, 0).result()
         waiting = [crew.submit(time.sleep, 600.0) for _ in range(2)]
@@ -181,10 +181,6 @@ def keep_a_crew(report: ReportProgress) -> None:
         wait(waiting)
     finally:
         crew.close(now=True)
-
-
-def nothing() -> None:
-    pass
 
 
 def nothing_of(_: int) -> None:

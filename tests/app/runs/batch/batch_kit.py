@@ -53,10 +53,6 @@ def waiting_apart(folder: str) -> None:
     waiting(folder)
 
 
-def nothing() -> None:
-    pass
-
-
 def rewriting_for_ever(path: str, change_begins: str) -> None:
     """Rewrite a run and hang while its copy is changed, as a library does that passes no exception on."""
 

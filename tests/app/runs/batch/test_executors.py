@@ -1,12 +1,14 @@
 """Many tasks in worker processes: order, bounds, failures, dead workers, interruption."""
 
 import os
+import subprocess
+import sys
 from concurrent.futures import Future
 from concurrent.futures.process import BrokenProcessPool
 from functools import partial
 
 import pytest
-from batch_kit import doubled, failing, fatal, nothing, rewriting_for_ever, waiting, waiting_apart
+from batch_kit import doubled, failing, fatal, rewriting_for_ever, waiting, waiting_apart
 from runs_kit import small_run
 
 from app.runs.batch.executors import (
@@ -63,7 +65,7 @@ class Broken(Unhurried):
 
 @pytest.fixture
 def processes():
-    crew = ProcessExecutor(2, nothing)
+    crew = ProcessExecutor(2)
     yield crew
     crew.close(now=True)
 
@@ -112,7 +114,7 @@ def test_a_process_that_dies_costs_one_run_at_most(processes, tmp_path):
 
 
 def test_work_is_given_up_at_once_and_leaves_nothing(tmp_path):
-    crew = ProcessExecutor(2, nothing)
+    crew = ProcessExecutor(2)
     futures = [crew.submit(waiting, str(tmp_path)) for _ in range(2)]
     wait_until(lambda: len(list(tmp_path.glob("*.half"))) == 2)
     running = [int(path.stem) for path in tmp_path.glob("*.half")]
@@ -128,7 +130,7 @@ def test_work_is_given_up_at_once_and_leaves_nothing(tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows wakes no sleeper; real work does not sleep")
 def test_work_that_waits_in_the_queue_is_not_begun_once_it_is_given_up(tmp_path):
-    crew = ProcessExecutor(1, nothing)
+    crew = ProcessExecutor(1)
     for _ in range(4):
         crew.submit(waiting_apart, str(tmp_path))
     wait_until(lambda: list(tmp_path.glob("*.half")))
@@ -140,7 +142,7 @@ def test_work_that_waits_in_the_queue_is_not_begun_once_it_is_given_up(tmp_path)
 def test_a_change_of_a_run_that_hangs_leaves_nothing_when_it_is_given_up(tmp_path, metadata):
     run = tmp_path / "run.h5"
     small_run(run, metadata)
-    crew = ProcessExecutor(1, nothing)
+    crew = ProcessExecutor(1)
     begun = tmp_path / "begun"
     crew.submit(partial(rewriting_for_ever, change_begins=str(begun)), str(run))
     wait_until(begun.exists)
@@ -168,3 +170,27 @@ def test_a_crash_in_a_worker_prints_its_traceback_where_that_is_wanted(
     assert outcome.error.template.startswith("Slipstand itself failed")
     printed = capfd.readouterr().err
     assert ("Traceback (most recent call last)" in printed) == bool(debug)
+
+
+_ENDED_WHILE_IT_LOADS = """
+import multiprocessing, os, signal, sys
+from app.runs.batch.parent_watchdog import exit_with_parent
+
+lifeline, _ = multiprocessing.Pipe(duplex=False)
+exit_with_parent(lifeline)
+
+class Loading:
+    def __del__(self):  # an exception in it is reported and goes no further, as in a callback of LLVM
+        try:
+            signal.raise_signal(signal.SIGTERM)
+        finally:
+            os.write(2, b"LLVM ERROR: cut off")
+
+Loading()
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="SIGTERM ends a process at once there")
+def test_a_process_that_is_ended_while_it_loads_code_reports_nothing():
+    ended = subprocess.run([sys.executable, "-c", _ENDED_WHILE_IT_LOADS], capture_output=True, text=True)
+    assert ended.stderr == ""

@@ -318,6 +318,41 @@ def test_a_frame_that_comes_late_gives_no_row_in_a_wrong_place():
     assert (decoder.losses.repeated, decoder.losses.missing, decoder.losses.restarts) == (2, 4, 0)
 
 
+@pytest.mark.parametrize("frames_before", [2, 20, 60])
+def test_a_device_that_restarts_at_once_is_noticed_and_gives_no_row_in_a_wrong_place(frames_before):
+    """At 500 Hz, 60 frames of 2 samples last 0.24 s: less than a frame may be late."""
+    decoder = FrameDecoder(RATE_HZ)
+    before, anew = stream(frames_before), encode_frames(0, np.arange(100) * 4000, readings(200, first=9000))
+    blocks = list(decoder.feed(b"".join(before), 1_000_000_000))
+    blocks += list(decoder.feed(anew[:3].tobytes(), 1_100_000_000))
+    blocks += list(decoder.feed(anew[3:].tobytes(), 1_500_000_000))
+    block, n = join(blocks), 2 * frames_before
+    np.testing.assert_array_equal(block.counts[:n], readings(n))
+    np.testing.assert_array_equal(block.counts[n + 44 :], readings(200, first=9000))
+    assert block.status.tolist() == [GOOD] * n + [MISSING] * 44 + [GOOD] * 200
+    assert decoder.losses == Losses(samples=n + 244, missing_estimated=44, restarts=1)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_many_reads_at_once_give_the_rows_and_losses_of_single_ones(seed):
+    """With lost and damaged frames, a restart, and reads without a whole frame."""
+    rng = np.random.default_rng(seed)
+    frames = stream(60) + stream(60, first_index=int(rng.choice([0, 124, 5000])), first_us=77)
+    kept = [flipped(frame, 20) if rng.random() < 0.05 else frame for frame in frames if rng.random() < 0.9]
+    wire = b"".join(kept)
+    pieces = list(cut_at(wire, rng.integers(1, len(wire), int(rng.choice([20, 400]))).tolist()))
+    reads = [(piece, 10_000_000 * number) for number, piece in enumerate(pieces) if piece]
+    single, grouped = FrameDecoder(RATE_HZ), FrameDecoder(RATE_HZ)
+    one_by_one = [block for read in reads for block in single.feed(*read)]
+    at_once = [
+        block for first in range(0, len(reads), 7) for block in grouped.feed_reads(reads[first : first + 7])
+    ]
+    assert grouped.losses == single.losses
+    expected, found = join(one_by_one), join(at_once)
+    np.testing.assert_array_equal(found.counts, expected.counts)
+    np.testing.assert_array_equal(found.status, expected.status)
+
+
 def test_a_drop_that_the_device_tells_agrees_with_its_gap():
     dropped = FrameFlags.DROPPED_BEFORE
     frames = [encode_frame(0, 0, readings(2), dropped), encode_frame(6, 0, readings(2), dropped)]

@@ -38,3 +38,9 @@ def test_what_is_not_a_whole_identify_line_is_none(received):
 def test_a_device_with_another_number_of_channels_is_refused():
     with pytest.raises(ProtocolError, match="4 channels and 2 are needed"):
         find_identity(b"slipstand-fw 1.0 500 4\r\n")
+
+
+def test_a_version_without_end_is_refused_in_one_short_line():
+    with pytest.raises(ProtocolError, match="more than 100 characters") as error:
+        find_identity(b"slipstand-fw " + b"A" * 1_000_000 + b" 500 2\n")
+    assert len(str(error.value)) < 200
