@@ -124,7 +124,8 @@ def assert_wider_breakaway(now: Any, then: Any) -> None:
     now["results"][_BREAKAWAY] = {**narrow, "value": wider["value"]}
     for one, other in zip(now["budget"], then["budget"], strict=True):
         if (one["contribution_to"], one["source"]) == (_BREAKAWAY, "noise"):
-            assert one["standard_uncertainty"] >= least * other["standard_uncertainty"], then["run"]
+            kept = max(LINE_DIFFERENCE * narrow["standard_uncertainty"], 1e-14)
+            assert one["standard_uncertainty"] >= other["standard_uncertainty"] - kept, then["run"]
             one["standard_uncertainty"] = other["standard_uncertainty"]
 
 
