@@ -4,6 +4,7 @@ Unicode true
 Target amd64-unicode
 !include "MUI2.nsh"
 !include "x64.nsh"
+!include "LogicLib.nsh"
 
 Name "Slipstand ${VERSION}"
 OutFile "${TARGET}"
@@ -33,6 +34,26 @@ VIAddVersionKey LegalCopyright "The Slipstand developers, MIT License"
 !define COMMAND "Software\Microsoft\Windows\CurrentVersion\App Paths\slipstand.exe"
 !define RUN_FILE "Software\Classes\Slipstand.Run"
 
+; Before anything is removed. Windows lets a program that runs be renamed, but not opened for writing.
+!macro StopIfRunning MESSAGE
+  ClearErrors
+  ${For} $1 1 2
+    StrCpy $2 "$INSTDIR\slipstand.exe"
+    ${If} $1 = 2
+      StrCpy $2 "$INSTDIR\slipstand-window.exe"
+    ${EndIf}
+    ${If} ${FileExists} $2
+      FileOpen $3 $2 a
+      ${If} ${Errors}
+        MessageBox MB_ICONSTOP "${MESSAGE}" /SD IDOK
+        SetErrorLevel 2
+        Abort
+      ${EndIf}
+      FileClose $3
+    ${EndIf}
+  ${Next}
+!macroend
+
 Function .onInit
   ${IfNot} ${RunningX64}
     MessageBox MB_ICONSTOP "Slipstand needs Windows with 64 bits." /SD IDOK
@@ -52,18 +73,8 @@ Function un.onInit
 FunctionEnd
 
 Section
-  ; A program that runs keeps its file: said before anything is removed.
-  ClearErrors
-  IfFileExists "$INSTDIR\slipstand.exe" 0 free
-    Rename "$INSTDIR\slipstand.exe" "$INSTDIR\slipstand.exe.old"
-    IfErrors 0 renamed
-      MessageBox MB_ICONSTOP "Slipstand is running. Close it and install again." /SD IDOK
-      SetErrorLevel 2
-      Abort
-    renamed:
-    RMDir /r "$INSTDIR\_internal"
-    Delete "$INSTDIR\slipstand.exe.old"
-  free:
+  !insertmacro StopIfRunning "Slipstand is running. Close it and install again."
+  RMDir /r "$INSTDIR\_internal"
   SetOutPath "$INSTDIR"
   File /r "${FOLDER}\*.*"
   WriteUninstaller "$INSTDIR\uninstall.exe"
@@ -89,6 +100,7 @@ Section
 SectionEnd
 
 Section "Uninstall"
+  !insertmacro StopIfRunning "Slipstand is running. Close it and uninstall again."
   RMDir /r "$INSTDIR\_internal"
   Delete "$INSTDIR\slipstand.exe"
   Delete "$INSTDIR\slipstand-window.exe"

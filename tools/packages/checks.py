@@ -47,6 +47,17 @@ cat /tmp/window.log
 """
 
 
+_WHILE_IT_RUNS = r"""
+wine {program} device simulate --tcp 0 --json > /tmp/simulated.log 2>&1 &
+for second in $(seq 120); do sleep 1; grep -q port /tmp/simulated.log && break; done
+wine /opt/windows/setup.exe /S; echo $?
+wine {uninstaller} /S; sleep 15
+"""
+"""Ends with the program: all that is run inside ends with its shell."""
+_REFUSED = 2
+"""Exit code of an installer that found the program running."""
+
+
 def main() -> int:
     """Try what is named; 1 if something fails, with a line for each check."""
     kinds = {"tarball": try_tarball, "deb": try_debian_package}
@@ -141,6 +152,7 @@ def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
     picture = environment.root / "tmp" / "installed-window.png"
     recorded = len(list((prefix / "drive_c" / "users").rglob("*.h5"))) - before - 2
     yield Check("window", picture.is_file() and recorded == 1, f"{picture} {recorded} run {said[-300:]}")
+    yield _while_it_runs(environment, folder, inside)
     for name in ("ucrtbase.dll", "ucrtw.dll", "icuuc.dll"):
         (folder / name).unlink()
     yield _windows_step(
@@ -155,6 +167,23 @@ def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
     yield Check(
         "nothing is left but recordings", not strange, f"{len(runs)} runs kept; {strange or 'no trace'}"
     )
+
+
+def _while_it_runs(environment: WindowsEnvironment, folder: Path, inside: str) -> Check:
+    """Neither installer nor uninstaller touches a program that runs."""
+    script = _WHILE_IT_RUNS.format(
+        program=shlex.quote(f"{inside}/slipstand.exe"), uninstaller=shlex.quote(f"{inside}/uninstall.exe")
+    )
+    before = _files(folder)
+    said = environment.run(["bash", "-c", script], _WINDOWS_S).stdout.split()
+    kept = _files(folder) == before
+    figures = f"installer's exit code {said}, {len(before)} files {'kept' if kept else 'changed'}"
+    return Check("install and uninstall while it runs", said == [str(_REFUSED)] and kept, figures)
+
+
+def _files(folder: Path) -> dict[Path, int]:
+    """Files of a folder with their times, by which a file that was written again is noticed."""
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
 def _windows_step(environment: WindowsEnvironment, name: str, command: list[str], timeout_s: float) -> Check:

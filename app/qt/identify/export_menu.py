@@ -41,11 +41,13 @@ class ExportMenu(QPushButton):
         self._print.setEnabled(self.isEnabled())
 
     def _ask_for_target(self) -> None:
-        dialog = QFileDialog(self, gettext("Report"), "", gettext("Reports (*.pdf)"))
+        target = Path(self._presenter.proposed_target)
+        # The folder apart: of the file selected, the dialog of Windows takes the name only.
+        dialog = QFileDialog(self, gettext("Report"), str(target.parent), gettext("Reports (*.pdf)"))
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix("pdf")
-        dialog.selectFile(self._presenter.proposed_target)
+        dialog.selectFile(target.name)
         dialog.fileSelected.connect(self._presenter.write)
         dialog.open()
 

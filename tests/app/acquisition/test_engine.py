@@ -57,7 +57,9 @@ def test_a_pullback_is_recorded_sample_by_sample(tmp_path):
     run = open_run(ended.path)
     first = index_of_first(run, truth)
     assert abs(first - round((REST_S + PULL_AND_HOLD_S - 1.0) * 1000.0)) <= 2
-    assert ended.missing + ended.damaged + ended.missing_estimated == 0
+    # none, unless a busy computer let the port run full
+    lost = lost_within(truth, first, first + len(run))
+    assert ended.missing + ended.damaged + ended.missing_estimated == lost
     np.testing.assert_allclose(run.time_s, np.arange(1500) / 1000.0, atol=1e-12)
     assert run.metadata.device.firmware == "simulated-1"
     assert run.metadata.port == simulated.port

@@ -14,11 +14,13 @@ from raw_bytes_kit import load_raw_bytes
 from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.truth import Truth
 from config.files import settings_file
 from drivers.devices.modbus.source import make_source
 from drivers.driver import GAUGES
 from drivers.registry import AVAILABLE, find_driver
 from drivers.samples import SampleStatus
+from drivers.simulated.faults import FrameFault
 from drivers.stream import SampleSource
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
@@ -80,11 +82,20 @@ def test_a_recorded_pullback_has_the_true_friction(
         given = [part for key, value in settings.items() for part in ("--set", f"{key}={value}")]
         wanted = ["--series", "1FFM0", "--rate", 1000, "--pretrigger", 0.5, "--duration", 4.5, "--json"]
         recorded = slipstand("record", *place, *given, *wanted).json
-        true = stand.truth().stand.friction_dynamic
-    assert (recorded["samples"], recorded["missing"], recorded["damaged"]) == (5000, 0, 0)
+        truth = stand.truth()
+    true = truth.stand.friction_dynamic
+    assert recorded["samples"] == 5000
+    assert recorded["missing"] + recorded["damaged"] <= cut_in_the_port(truth)
     assert open_run(recorded["run"]).metadata.device.protocol == protocol
     (found,) = slipstand("analyze", recorded["run"], "--json").json
     assert found["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
+
+
+def cut_in_the_port(truth: Truth) -> int:
+    """Samples that a port had no room for: a busy computer did not read for so long."""
+    cut = {FrameFault.CUT, FrameFault.MERGED}  # a line behind one that was cut is part of it
+    damage = [stretch for wire in (*truth.earlier, truth.wire) for stretch in wire.damage]
+    return sum(stretch.samples for stretch in damage if stretch.fault in cut)
 
 
 @pytest.mark.parametrize("protocol", [driver.name for driver in AVAILABLE])

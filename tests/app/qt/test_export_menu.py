@@ -49,6 +49,20 @@ def test_the_report_of_a_run_is_written_where_its_operator_says(stage: Stage, tm
     assert clipped_words(stage.screen) == []
 
 
+def test_a_report_is_offered_in_the_folder_of_its_run(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    selected: list[str] = []
+    monkeypatch.setattr(QFileDialog, "selectFile", lambda _dialog, name: selected.append(name))
+    monkeypatch.setattr(type(stage.presenter.report), "proposed_target", str(tmp_path / "run.pdf"))
+    chosen(stage, "Report as PDF…")
+    dialog = stage.screen.findChild(QFileDialog)
+    assert dialog is not None
+    assert selected == ["run.pdf"]
+    assert Path(dialog.directory().path()) == tmp_path
+    dialog.close()
+
+
 def test_the_folders_of_a_report_and_of_a_run_are_opened(
     stage: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
