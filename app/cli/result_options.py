@@ -94,7 +94,9 @@ class TableOptions:
     """
 
     paths: list[Path] = shared.runs_or_folders()
-    format_name: str = choice("--format", TABLE_FORMATS, "Format of the table.", "text")
+    format_name: str | None = choice(
+        "--format", TABLE_FORMATS, "Format of the table; by the ending of -o if absent, else text."
+    )
     published: bool = flag("--published", "Beside the paper's Table 1, with the audit's flags.")
     repeats: bool = flag("--repeats", "Text, Markdown: show how the runs of each series differ.")
     column: list[str] | None = option(

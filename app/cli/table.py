@@ -11,9 +11,9 @@ from analysis.campaign.campaign import Campaign, compare_with_published
 from analysis.catalogue import optional_columns
 from app.cli import output as out
 from app.cli.campaigns import exit_with_failures, load_campaign
-from app.cli.errors import CommandError
+from app.cli.errors import CommandError, alternatives
 from app.cli.result_options import TableOptions
-from app.reports.table.files import as_text, write_table
+from app.reports.table.files import FORMAT_OF_ENDING, as_text, write_table
 from app.reports.table.text import PublishedRowComparison, TableContent, note_sections
 from app.runs.campaign.origin import campaign_command
 from config.files import load_stand, published_table
@@ -51,10 +51,16 @@ def _reproduce(options: TableOptions) -> str:
     return campaign_command("table", options.paths, words)
 
 
-def _format(name: str, output: Path | None, *, as_json: bool) -> str:
-    if as_json and name not in ("text", "json"):
+def _format(name: str | None, output: Path | None, *, as_json: bool) -> str:
+    if as_json and name not in (None, "text", "json"):
         raise CommandError(f"--json and --format {name} contradict each other. Give one of them")
-    name = "json" if as_json else name
+    if as_json:
+        return "json"
+    if name is None:
+        name = FORMAT_OF_ENDING.get(output.suffix.lower()) if output else "text"
+    if name is None:
+        endings = alternatives([ending for ending in FORMAT_OF_ENDING if ending])
+        raise CommandError(f"-o {output} has no known ending. Use {endings}, or give --format")
     if name == "xlsx" and output is None:
         raise CommandError("--format xlsx is a file. Say where it goes: -o TABLE.xlsx")
     return name

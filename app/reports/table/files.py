@@ -30,6 +30,15 @@ from app.runs.exchange.export_formats import Sheet, csv_cell, escape_latex, writ
 
 TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
 FORMATS: Final = (*TEXTS, "xlsx")
+FORMAT_OF_ENDING: Final = {
+    "": "text",
+    ".txt": "text",
+    ".csv": "csv",
+    ".json": "json",
+    ".md": "markdown",
+    ".tex": "latex",
+    ".xlsx": "xlsx",
+}
 _UNLIMITED_WIDTH: Final = 1_000_000  # of a text that is not printed on a terminal
 
 

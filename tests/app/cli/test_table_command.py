@@ -132,10 +132,28 @@ def test_files_are_written_and_not_overwritten(slipstand, folder, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("name", "mark"),
+    [
+        ("t.xlsx", b"PK"),
+        ("t.csv", b"series,"),
+        ("t.JSON", b'"schema"'),
+        ("t.md", b"| series |"),
+        ("t.txt", b"series  n "),
+        ("t", b"series  n "),
+    ],
+)
+def test_the_ending_of_a_file_says_its_format(slipstand, folder, tmp_path, name, mark):
+    path = tmp_path / name
+    slipstand("table", folder, "-o", path)
+    assert mark in path.read_bytes()
+
+
+@pytest.mark.parametrize(
     ("options", "fault"),
     [
         (("--format", "pdf"), "--format 'pdf' is not known"),
         (("--format", "xlsx"), "-o TABLE.xlsx"),
+        (("-o", "table.pdf"), "has no known ending"),
         (("--format", "csv", "--json"), "contradict each other"),
         (("--exclude", "nobody"), "--exclude nobody is none of the 3 runs"),
     ],
