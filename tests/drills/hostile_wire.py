@@ -3,8 +3,8 @@
 A proxy stands between a simulated stand and the engine, and changes what comes while a run is recorded:
 frames twice, shuffled, one in a thousand, with random number or time and a right checksum, a megabyte instead
 of them, the identity of another device, nothing at all. The stand itself sends at double or half, ten times
-or a thousandth of the rate that it states, or gives an identity without end. Each run must go on or end with one line, no good row be one that
-was never sent, and the engine's memory stay bounded.
+or a thousandth of the rate that it states, or gives an identity without end. Each run must go on or end with
+one line, no good row be one that was never sent, and the engine's memory stay bounded.
 """
 
 import argparse
