@@ -90,4 +90,4 @@ def test_who_has_no_certificate_is_refused_in_one_line(cluster, short_runs):
     assert refused.returncode == 1
     assert refused.stdout == ""
     assert len(refused.stderr.splitlines()) == 1
-    assert "no Dask scheduler answers" in refused.stderr
+    assert "asks for a certificate" in refused.stderr
