@@ -93,8 +93,8 @@ def analysed(library: Path, count: int) -> str:
         again_s, again = one_pass(files, cluster.scheduler_address)
     failed = sum(bool(outcome.error) for outcome in (*outcomes, *again))
     anew = sum(not outcome.up_to_date for outcome in again)
-    cells = f"{first_s:.0f} | {first_s / count * 1e3:.0f} | {failed} | {again_s:.0f} | {again_s / count * 1e3:.0f}"
-    return f"| {count} | {cells} | {anew} |"
+    first, second = (f"{took_s:.0f} | {took_s / count * 1e3:.0f}" for took_s in (first_s, again_s))
+    return f"| {count} | {first} | {failed} | {second} | {anew} |"
 
 
 class Disturbance:
