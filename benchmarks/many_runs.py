@@ -1,24 +1,35 @@
-"""A hundred thousand run files, listed and filtered: `python benchmarks/many_runs.py [--runs 10000,100000]`.
+"""A hundred thousand run files, listed, filtered and analysed: `python benchmarks/many_runs.py`.
 
 Run files of 5 s at 200 Hz, hard links to a few of them, in folders of a thousand. The first listing examines
 each file; it is measured on one folder and scaled, since it grows with their number alone. The index of all
-is then made of those summaries, and the rest is measured on all files. Processor times.
+of all is then made of those summaries, and the rest is measured on all files. Processor times.
+
+`--analyse 1000,100000`: so many of the runs are analysed and saved on a Dask cluster of two workers, of which
+one is killed after a tenth of the runs, and the other stopped for half of each second. Then a hundredth of
+the runs is new, and a second pass analyses these alone. Times by the clock.
 """
 
 import argparse
 import os
 import resource
+import signal
 import statistics
 import sys
 import tempfile
+import threading
+import time
 from pathlib import Path
 
 import msgspec
+from distributed import Client, LocalCluster
 from library import parameters
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from app.runs import listing
+from app.runs.analysis_request import AnalysisRequest
+from app.runs.batch.executors import ExecutorOptions, open_executor
+from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
 from app.runs.listing import RunFilter, list_runs
 from app.runs.simulated import write_simulated_run
 
@@ -28,8 +39,16 @@ REPEATS = 3
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--runs", default="10000,100000")
+    parser.add_argument("--analyse", help="numbers of runs to analyse; nothing is listed then")
     chosen = parser.parse_args()
     print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores")
+    if chosen.analyse:
+        print("| runs | first pass, s | ms a run | failed | second pass, s | ms a run | analysed anew |")
+        print("|---|---|---|---|---|---|---|")
+        for count in map(int, chosen.analyse.split(",")):
+            with tempfile.TemporaryDirectory() as place:
+                print(analysed(Path(place) / "library", count), flush=True)
+        return
     print("| runs | first listing, scaled | listed | filtered | one changed | index | memory, MB |")
     print("|---|---|---|---|---|---|---|")
     for count in map(int, chosen.runs.split(",")):
@@ -59,6 +78,68 @@ def row(library: Path, count: int) -> str:
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     cells = f"{first_s:.0f} | {listed_s:.2f} | {filtered_s:.2f} | {changed_s:.2f} | {size / 1e6:.1f} MB"
     return f"| {count} | {cells} | {memory_mb:.0f} |"
+
+
+def analysed(library: Path, count: int) -> str:
+    """Analyse a library of so many runs twice, the first time with a worker killed and one slow."""
+    files = fill(library, count)
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
+        with Client(cluster.scheduler_address, set_as_default=False) as client:
+            killed, slow = client.run(os.getpid).values()
+        first_s, outcomes = one_pass(files, cluster.scheduler_address, Disturbance(killed, slow, count // 10))
+        for file in files[::100]:  # as a run that was recorded since
+            file.unlink()
+            write_simulated_run(file, parameters().simulate(5.0), parameters(), series="1FFM0", rate_hz=200.0)
+        again_s, again = one_pass(files, cluster.scheduler_address)
+    failed = sum(bool(outcome.error) for outcome in (*outcomes, *again))
+    anew = sum(not outcome.up_to_date for outcome in again)
+    first, second = (f"{took_s:.0f} | {took_s / count * 1e3:.0f}" for took_s in (first_s, again_s))
+    return f"| {count} | {first} | {failed} | {second} | {anew} |"
+
+
+class Disturbance:
+    """Kills a process once `after` runs are done, and stops another for half of each second."""
+
+    def __init__(self, killed: int, slow: int, after: int) -> None:
+        self._killed, self._slow, self._after = killed, slow, after
+        self._has_ended = threading.Event()
+        self._thread = threading.Thread(target=self._slow_down)
+        self._thread.start()
+
+    def on_run(self, done: int) -> None:
+        """Note that so many runs are done."""
+        if done == self._after:
+            os.kill(self._killed, signal.SIGKILL)
+
+    def end(self) -> None:
+        """Leave the slow process alone."""
+        self._has_ended.set()
+        self._thread.join()
+
+    def _slow_down(self) -> None:
+        while not self._has_ended.wait(0.5):
+            os.kill(self._slow, signal.SIGSTOP)
+            self._has_ended.wait(0.5)
+            os.kill(self._slow, signal.SIGCONT)
+
+
+def one_pass(
+    files: list[Path], address: str, disturbance: Disturbance | None = None
+) -> tuple[float, list[AnalysisOutcome]]:
+    """Time (s) of `slipstand analyze --save --dask`, and what came of each run without its document."""
+    tasks = [AnalysisTask(str(path), AnalysisRequest(classical=False), save=True) for path in files]
+    outcomes: list[AnalysisOutcome] = []
+    began_s = time.perf_counter()
+    try:
+        with open_executor(ExecutorOptions(dask=address), len(tasks)) as executor:
+            for done, outcome in enumerate(analyze_runs(tasks, executor), 1):
+                outcomes.append(msgspec.structs.replace(outcome, document=None))
+                if disturbance is not None:
+                    disturbance.on_run(done)
+    finally:
+        if disturbance is not None:
+            disturbance.end()
+    return time.perf_counter() - began_s, outcomes
 
 
 def fill(library: Path, count: int) -> list[Path]:

@@ -2,9 +2,9 @@
 
 The folder of the runs is mounted through bindfs, a FUSE file system whose process is stopped: every call on
 the folder then waits. Or only syncs of its files wait, as a library loaded into the engine has them do
-(`preload.c`), while writes go on. The operator must be told within 2 s, the run end within 10 s, and another run be armed
-elsewhere at once. On the folder itself arming must be refused, while samples go on. When the disk is back,
-all samples that were told must be rebuilt.
+(`preload.c`), while writes go on. The operator must be told within 2 s, the run end within 10 s, and another
+run be armed elsewhere at once. On the folder itself arming must be refused, while samples go on. When the
+disk is back, all samples that were told must be rebuilt.
 """
 
 import contextlib
@@ -108,7 +108,7 @@ class HangingDisk:
 
 
 class HangingSync:
-    """A folder whose files take writes and no syncs while it hangs; a context manager for an engine's start."""
+    """A folder whose files take writes and no syncs while it hangs; an engine is to be started within it."""
 
     def __init__(self, place: Path) -> None:
         self.folder = place / "share"
@@ -161,9 +161,7 @@ def hanging_disk(count: int, folder: Path, kind: str = "disk") -> HangReport:
     return report
 
 
-def _one_run(
-    disk: Disk, engine: EngineClient, place: Path, fallback: Path, report: HangReport
-) -> None:
+def _one_run(disk: Disk, engine: EngineClient, place: Path, fallback: Path, report: HangReport) -> None:
     wait_for(engine, Connected)
     run = RunSettings(str(disk.folder), series="1FFM0", trigger="none", duration_s=60.0)
     engine.send(Arm(run))

@@ -3,8 +3,8 @@
 A proxy stands between a simulated stand and the engine, and changes what comes while a run is recorded:
 frames twice, shuffled, one in a thousand, with random number or time and a right checksum, a megabyte instead
 of them, the identity of another device, nothing at all. The stand itself sends at double or half, ten times
-or a thousandth of the rate that it states, or gives an identity without end. Each run must go on or end with one line, no good row be one that
-was never sent, and the engine's memory stay bounded.
+or a thousandth of the rate that it states, or gives an identity without end. Each run must go on or end with
+one line, no good row be one that was never sent, and the engine's memory stay bounded.
 """
 
 import argparse
@@ -41,6 +41,8 @@ from tests.drills.sent import Sent
 RATE_HZ = 500.0
 MEMORY_MAX_BYTES = 600_000_000
 PATIENCE_S = 60.0
+WIRE_S = 10.0
+"""Length of a run whose wire is changed: a busy computer has the file of a run seconds after its begin."""
 _FRAME = frame_length(samples_per_frame(RATE_HZ))
 Change = Callable[[list[bytes], random.Random], list[bytes]]
 
@@ -99,6 +101,8 @@ class Proxy(threading.Thread):
     def __init__(self, device: str, change: Change, seed: int, identity: bytes = b"") -> None:
         super().__init__(name="proxy", daemon=True)
         self.is_changing = threading.Event()
+        self.changed = 0
+        """Pieces of the stream that were changed."""
         self._change, self._chance, self._identity = change, random.Random(seed), identity
         host, _, port = device.removeprefix("socket://").partition(":")
         self._device = (host, int(port))
@@ -138,6 +142,7 @@ class Proxy(threading.Thread):
                     rest = b""
                     target.sendall(data)
                     continue
+                self.changed += 1
                 frames, rest = _frames(rest + data)
                 target.sendall(b"".join(self._change(frames, self._chance)))
                 time.sleep(0.05)  # so that some frames come together
@@ -193,7 +198,8 @@ def _one_run(way: str, folder: Path, seed: int, report: WireReport) -> None:
             with _engine(proxy.url) as engine:
                 event = _await(engine, (Failed, Connected))
                 if isinstance(event, Connected):
-                    run = RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=3.0)
+                    duration_s = WIRE_S if way in WIRES else 3.0
+                    run = RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=duration_s)
                     engine.send(Arm(run))
                     event = _await(engine, (Failed, RunStarted, RunEnded))
                 if isinstance(event, RunStarted):
@@ -205,6 +211,8 @@ def _one_run(way: str, folder: Path, seed: int, report: WireReport) -> None:
                 truth = ask(stand)
         finally:
             proxy.close()
+        if way in WIRES and not proxy.changed:
+            raise ValueError("the run was over before the wire was changed")
         if isinstance(event, Failed):
             _check_said(str(event.message), report)
         elif isinstance(event, RunEnded):

@@ -93,9 +93,9 @@ class RateMonitor:
         if self._first_ns is None:
             self._first_ns = self._window_ns = arrival_ns
         if self._quick is None:
-            self._measure_quickness(index)
-            if self._quick is not None:
-                return rate_note(self._quick.scale, self._rate_hz)
+            quick = self._quick = self._measure_quickness(index)
+            if quick is not None:
+                return rate_note(quick.scale, self._rate_hz)
             if arrival_ns - self._first_ns < _SETTLING_S * 1e9:
                 return EMPTY
         self._whole.add(index, arrival_ns)
@@ -141,17 +141,21 @@ class RateMonitor:
         self._delay_s = (self._latest_ns - begun_ns) * 1e-9 - (index - first) / self._rate_hz
         self._least_delay_s = min(self._least_delay_s, self._delay_s)
 
-    def _measure_quickness(self, index: int) -> None:
-        """Samples that were held somewhere come quickly too, but within one window, or late."""
+    def _measure_quickness(self, index: int) -> ClockEstimate | None:
+        """Rate of a device that sends much too quickly; None for any other.
+
+        Samples that were held somewhere come quickly too, but within one window, or late.
+        """
         begins, latest = self._quick_windows, (index, self._latest_ns)
         if not begins or latest[1] - begins[-1][1] > self._quick_window_s * 1e9:
             begins.append(latest)
         if len(begins) <= _WINDOWS or self._delay_s > -_AHEAD_S:
-            return
-        if min(starmap(_rate_hz, pairwise(begins))) > _QUICK * self._rate_hz:
-            rate_hz = float(f"{_rate_hz(begins[0], begins[-1]):.2g}")
-            scale, span_s = self._rate_hz / rate_hz, (begins[-1][1] - begins[0][1]) * 1e-9
-            self._quick = ClockEstimate(rate_hz, scale, scale * _LATE_S / span_s, span_s)
+            return None
+        if min(starmap(_rate_hz, pairwise(begins))) <= _QUICK * self._rate_hz:
+            return None
+        rate_hz = float(f"{_rate_hz(begins[0], begins[-1]):.2g}")
+        scale, span_s = self._rate_hz / rate_hz, (begins[-1][1] - begins[0][1]) * 1e-9
+        return ClockEstimate(rate_hz, scale, scale * _LATE_S / span_s, span_s)
 
     def _is_no_delay(self, estimate: ClockEstimate) -> bool:
         """Tell whether a wrong rate is more than samples that come later and later, or catch up."""

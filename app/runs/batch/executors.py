@@ -340,7 +340,17 @@ def _connect(address: str) -> Any:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # failures are in the answers
     try:
         distributed.comm.get_address_host_port(address)  # the client takes 20 s to find a bad address
-        return distributed.Client(address, timeout=_CLUSTER_TIMEOUT_S, set_as_default=False)
+        security = distributed.Security()
+        shown = security.get_connection_args("client")
+        if address.startswith("tls://") and shown.get("ssl_context") is None:
+            raise ClusterError(
+                "{address} asks for a certificate. State ca-file, client.cert and client.key of Dask's"
+                " distributed.comm.tls",
+                address=address,
+            )
+        return distributed.Client(
+            address, timeout=_CLUSTER_TIMEOUT_S, set_as_default=False, security=security
+        )
     except (OSError, ValueError, TypeError, RuntimeError) as error:
         raise ClusterError(
             "no Dask scheduler answers at {address!r} ({fault})."

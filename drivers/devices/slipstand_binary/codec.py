@@ -214,7 +214,7 @@ number that follows without a loss; sequence, time and unwrapped time (us) of th
 
 
 RECENT = record_type("seq checksum", "")
-"""A frame that came lately: its sequence number, plus one, and its checksum, which stands for its contents."""
+"""A frame that came lately: its sequence number plus one, and its checksum, which stands for its contents."""
 
 
 @compiled
