@@ -73,11 +73,11 @@ desktop-tools:
 	@$(call install_packages,$(DESKTOP_TEST_PACKAGES),true)
 
 # $(1): packages of Debian and Ubuntu that must be there, or one that provides them: Debian 13 and Ubuntu 24.04 have
-# libglib2.0-0t64 for libglib2.0-0. $(2): a command that may add to $$missing.
+# libglib2.0-0t64 for libglib2.0-0. One whose triggers have still to run, while another is installed, is there. $(2): a command that may add to $$missing.
 define install_packages
 command -v dpkg-query >/dev/null 2>&1 || exit 0; \
 	installed=$$(dpkg-query -W -f '$${db:Status-Status} $${Package},$${Provides}\n' | \
-		sed -n 's/^installed //p' | tr ',' '\n' | sed 's/^ *//; s/ .*//'); \
+		sed -n -E 's/^(installed|triggers-[a-z]+) //p' | tr ',' '\n' | sed 's/^ *//; s/ .*//'); \
 	missing=""; \
 	for package in $(1); do \
 		printf '%s\n' "$$installed" | grep -qxF "$$package" || missing="$$missing $$package"; \

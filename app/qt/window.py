@@ -28,7 +28,7 @@ from app.qt.stand_screen import StandScreen
 from app.qt.start_screen import StartScreen
 from app.qt.theme import SCHEMES, TextRole, Theme, font, set_property
 from app.qt.widgets.icons import icon
-from app.qt.widgets.inputs import make_button
+from app.qt.widgets.inputs import connect_chosen, make_button
 from app.qt.widgets.layouts import STRETCH, make_column, make_row
 from app.qt.widgets.shortcuts import HelpDialog, add_shortcut, bind_button, list_shortcuts
 from app.qt.widgets.text import label, set_text_or_hide
@@ -113,7 +113,7 @@ class MainWindow(KeyboardWindow):
         dialog.setNameFilters([gettext("Runs (*.h5)"), gettext("All files (*)")])
         dialog.setFileMode(QFileDialog.FileMode.ExistingFile)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(self._presenter.open_run)
+        connect_chosen(dialog, self._presenter.open_run)
         dialog.open()
 
     def find_amplifier(self) -> None:

@@ -21,6 +21,11 @@ def wanted() -> list[str]:
 
 def paragraph(name: str, provides: str = "", status: str = "installed") -> str:
     provided = f"Provides: libother (= 1), {provides} (= 2.84.4-3)\n" if provides else ""
+    waits = {
+        "triggers-pending": "Triggers-Pending: ldconfig\n",
+        "triggers-awaited": "Triggers-Awaited: libc-bin\n",
+    }
+    provided += waits.get(status, "")
     head = f"Package: {name}\nStatus: install ok {status}\nArchitecture: amd64\nVersion: 2.84.4-3\n"
     return f"{head}{provided}Maintainer: nobody <nobody@example.org>\nDescription: a library\n\n"
 
@@ -46,6 +51,15 @@ def test_a_library_under_its_later_name_is_not_missing(tmp_path: Path) -> None:
     there = [paragraph(name) for name in wanted() if name != REMOVED]
 
     ended = asked_for(tmp_path, [*there, paragraph(LATER, provides=REMOVED)])
+
+    assert (ended.returncode, ended.stdout + ended.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("status", ["triggers-pending", "triggers-awaited"])
+def test_a_library_is_there_while_another_is_installed(tmp_path: Path, status: str) -> None:
+    there = [paragraph(name, status=status if name == REMOVED else "installed") for name in wanted()]
+
+    ended = asked_for(tmp_path, there)
 
     assert (ended.returncode, ended.stdout + ended.stderr) == (0, "")
 

@@ -153,6 +153,7 @@ def test_results_are_shown_as_text_table_and_figure(result) -> None:
     assert len(result.plot().axes) == 4  # residuals of each gauge have a panel
 
 
+@pytest.mark.timeout(1800)  # 80 runs to identify, on a busy computer
 def test_correlations_are_those_of_repeated_tests() -> None:
     names = (
         "friction_dynamic",

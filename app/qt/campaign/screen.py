@@ -14,7 +14,7 @@ from app.qt.campaign.sections import SelectedRuns, make_sections
 from app.qt.campaign.table import SeriesTable
 from app.qt.theme import TextRole, Theme
 from app.qt.widgets.folder_button import FolderButton, OpenFolderButton
-from app.qt.widgets.inputs import CheckBox, ProgressBar, ask_for_folder, make_button
+from app.qt.widgets.inputs import CheckBox, ProgressBar, ask_for_folder, connect_chosen, make_button
 from app.qt.widgets.layouts import STRETCH, clear, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import ElidedLabel, break_path, label, set_tool_tip, show_chip
@@ -142,7 +142,7 @@ class CampaignScreen(QWidget):
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.selectFile(name)
-        dialog.fileSelected.connect(export)
+        connect_chosen(dialog, export)
         dialog.open()
 
     def _make_page(self) -> QWidget:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QFileDialog, QMenu, QPushButton, QWidget
 
 from app.presenters.identify.report import ReportPresenter, ReportState
 from app.qt.widgets.folder_button import OpenFolderButton
+from app.qt.widgets.inputs import connect_chosen
 from app.qt.widgets.layouts import STRETCH, make_row
 from app.qt.widgets.shortcuts import add_shortcut
 from app.qt.widgets.text import label, set_tool_tip, show_chip
@@ -48,7 +49,7 @@ class ExportMenu(QPushButton):
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setDefaultSuffix("pdf")
         dialog.selectFile(target.name)
-        dialog.fileSelected.connect(self._presenter.write)
+        connect_chosen(dialog, self._presenter.write)
         dialog.open()
 
     def _ask_to_print(self) -> None:

@@ -74,7 +74,7 @@ class ExportDialog(QDialog):
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
         dialog.setOption(QFileDialog.Option.DontConfirmOverwrite)  # the box below says whether
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        dialog.fileSelected.connect(self._presenter.set_output)
+        inputs.connect_chosen(dialog, self._presenter.set_output)
         dialog.open()
 
     def _connect(self) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from PySide6.QtCore import QEvent, QPointF, Qt, Signal
+from PySide6.QtCore import QDir, QEvent, QPointF, Qt, Signal
 from PySide6.QtGui import QFontDatabase, QKeyEvent, QPainter, QPaintEvent, QPalette, QPen
 from PySide6.QtWidgets import (
     QCheckBox,
@@ -118,8 +118,13 @@ def ask_for_folder(parent: QWidget, title: str, start: str, choose: Callable[[st
     dialog = QFileDialog(parent, title, start)
     dialog.setFileMode(QFileDialog.FileMode.Directory)
     dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-    dialog.fileSelected.connect(choose)
+    connect_chosen(dialog, choose)
     dialog.open()
+
+
+def connect_chosen(dialog: QFileDialog, choose: Callable[[str], object]) -> None:
+    """Pass on the chosen path as the system writes it: Qt has `/` on Windows too."""
+    dialog.fileSelected.connect(lambda path: choose(QDir.toNativeSeparators(path)))
 
 
 def ask(parent: QWidget, text: str, detail: str, action: str, act: Callable[[], object]) -> None:

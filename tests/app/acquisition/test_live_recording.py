@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from engine_kit import FILES, connect, port_of, record_run, run_in, stand, until
+from engine_kit import connect, port_of, run_in, stand, until
 
 from app.acquisition.live_client import DIED_NOTE
-from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged
+from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged, Stop
 from tests.drills.processes import children_of, gone
-from tests.waiting import wait_until
+from tests.waiting import PATIENCE_S, wait_until
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks for processes in /proc")
 
@@ -31,13 +31,12 @@ def live_process_of(engine_pid):
 
 
 def test_friction_is_told_while_the_motion_dies_away(tmp_path):
-    events = []
-    with stand(hold_s=5.0, decay_s=6.0) as simulated:
-        ended = record_run(port_of(simulated), run_in(tmp_path, duration_s=5.0), *FILES, events.append)
+    with stand(hold_s=5.0, decay_s=PATIENCE_S) as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path, duration_s=PATIENCE_S)))
+        results = [until(engine, LiveResult) for _ in range(11)]
+        engine.send(Stop())
+        assert until(engine, RunEnded).ended is EndReason.STOPPED
 
-    results = [event for event in events if isinstance(event, LiveResult)]
-    assert ended.ended is EndReason.DURATION
-    assert len(results) > 10
     last = results[-1].friction_dynamic
     assert last is not None
     assert last.value == pytest.approx(0.1, abs=4.0 * last.standard_uncertainty)

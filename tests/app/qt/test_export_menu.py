@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from looking import clipped_words
-from PySide6.QtCore import QBuffer, Qt
+from PySide6.QtCore import QBuffer, QDir, Qt
 from PySide6.QtGui import QDesktopServices, QImage
 from PySide6.QtPrintSupport import QPrintDialog, QPrinter
 from PySide6.QtWidgets import QFileDialog
@@ -61,6 +61,18 @@ def test_a_report_is_offered_in_the_folder_of_its_run(
     assert selected == ["run.pdf"]
     assert Path(dialog.directory().path()) == tmp_path
     dialog.close()
+
+
+def test_a_path_that_is_chosen_is_written_as_the_system_writes_it(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(QDir, "toNativeSeparators", lambda path: path.replace("/", "\\"))
+    chosen(stage, "Report as PDF…")
+    dialog = stage.screen.findChild(QFileDialog)
+    assert dialog is not None
+    dialog.fileSelected.emit("C:/tests/report.pdf")
+    dialog.close()
+    assert stage.reports.calls[-1].arguments == (RUN, "C:\\tests\\report.pdf")
 
 
 def test_the_folders_of_a_report_and_of_a_run_are_opened(
