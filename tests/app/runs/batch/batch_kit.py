@@ -8,6 +8,7 @@ import uuid
 from pathlib import Path
 
 from app.runs.rewrite import rewrite
+from tests.waiting import wait_until
 
 
 def doubled(number: int) -> int:
@@ -26,9 +27,10 @@ def failing(number: int) -> int:
 
 
 def fatal(item: tuple[int, str]) -> int:
-    """Kill the own process: item 4 always, item 1 unless it was tried before."""
+    """Kill the own process: item 4 always, item 1 unless it was tried before; 1 dies first."""
     number, folder = item
     if number == 4:
+        wait_until((Path(folder) / "1").exists)  # else 1, which is done again with 4, might die with that
         os.kill(os.getpid(), signal.SIGTERM if os.name == "nt" else signal.SIGKILL)
     tried = Path(folder) / str(number)
     if number == 1 and not tried.exists():
@@ -40,8 +42,8 @@ def fatal(item: tuple[int, str]) -> int:
 def waiting(folder: str) -> None:
     """Say which process this is, then wait for long; what is half written is cleared away in the end."""
     half = Path(folder) / f"{os.getpid()}.half"
-    half.touch()
     try:
+        half.touch()
         time.sleep(60.0)
     finally:
         half.unlink()
