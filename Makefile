@@ -26,7 +26,7 @@ help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
 	@echo "make run     the window on the simulated stand; without a display, 'slipstand demo'"
 	@echo "make test    all tests"
-	@echo "make lint    ruff, mypy, import contracts"
+	@echo "make lint    ruff, mypy, import contracts, the schema of workflows"
 	@echo "make bench   benchmarks, ratios in one run (docs/benchmarks.md)"
 	@echo "make bench-recording   recording, release detection, library and recovery, a quarter of an hour"
 	@echo "make bench-desktop     repaint, wire to screen, start, the handle of f_d; a minute"
@@ -123,6 +123,7 @@ lint: types
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
 
 types: types-host types-win32 types-darwin
 
