@@ -174,7 +174,7 @@ def test_a_run_says_its_time_and_series_once_and_what_was_found_where_from_and_h
     assert hint == "319.9420 ± 0.0048\u202fms"
 
 
-@pytest.mark.parametrize("language", ["en", "ru"])
+@pytest.mark.parametrize("language", ["en", "ru", "uz"])
 def test_a_window_of_1280_shows_the_usual_columns_without_scrolling_sideways(
     theme: Theme, qtbot: QtBot, language: str, use_language: Callable[[str], None]
 ) -> None:
