@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from app.version import __version__
-from tools.packages import linux, recipes
+from tools.packages import recipes
 
 ROOT = Path(__file__).resolve().parents[2]
 LINUX = ROOT / "packaging" / "linux"
@@ -47,8 +47,3 @@ def test_a_run_file_has_the_word_by_which_it_is_told_from_other_hdf5(slipstand, 
     (inner,) = outer
     assert outer.get("value", "").encode().decode("unicode_escape").encode("latin-1") == start[:8]
     assert inner.get("value", "").encode() in start[64:]
-
-
-def test_the_debian_package_brings_what_tells_the_weights_of_a_typeface():
-    """Seen on minimal systems: without it titles are bold."""
-    assert "fontconfig-config" in linux._DEPENDS.split(", ")

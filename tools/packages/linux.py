@@ -10,9 +10,8 @@ from tools.packages.folder import BUILD, DIST, ICON, PACKAGING, PROJECT, png_ico
 
 DEBIAN_NAME = f"slipstand_{__version__}_amd64.deb"
 ARCHIVE_NAME = f"slipstand-{__version__}-linux-{platform.machine()}.tar.gz"
-_DEPENDS = "libc6 (>= 2.36), libstdc++6, libgcc-s1, libegl1, libgl1, libglx0, libopengl0, fontconfig-config"
-"""Drawing is left to the system, since its drivers must fit; other libraries are in the folder. Without the
-configuration of fontconfig the window shows titles in bold."""
+_DEPENDS = "libc6 (>= 2.36), libstdc++6, libgcc-s1, libegl1, libgl1, libglx0, libopengl0"
+"""Drawing is left to the system, since its drivers must fit; other libraries are in the folder."""
 _CONTROL = """\
 Package: slipstand
 Version: {version}
