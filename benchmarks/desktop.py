@@ -22,6 +22,7 @@ os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QEventLoop, QPoint, QPointF, Qt
 from PySide6.QtGui import QMouseEvent, QWheelEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from app.acquisition.messages import PullbackState, StandPosition
@@ -198,6 +199,7 @@ def zoom_and_pan(app: QApplication, theme: Theme, frames: Frames, count: int) ->
     for name, plots in (("Record", live), ("Identify", fitted)):
         plots.resize(*SIZE)
         plots.show()
+        QTest.qWaitForWindowExposed(plots)  # without, X may not have it yet and nothing is painted
         app.processEvents()
         plots._stack.reset_view()
         (view,) = plots.findChildren(pg.GraphicsView)
