@@ -19,7 +19,7 @@ from app.acquisition.messages import PortSettings, RunEnded, RunSettings
 from app.acquisition.stream.live_stream import LiveStream
 from app.runs.journal import SUFFIX
 from app.runs.metadata import RunMetadata, RunSource, create_metadata
-from app.runs.paths import journal_fallback_folders
+from app.runs.paths import journal_fallback_folders, run_stem
 from app.version import __version__
 from config.files import load_checks
 from config.schema import Device, Filter, Gauges, Stand
@@ -108,8 +108,8 @@ def with_device_filters(gauges: Gauges, filters: tuple[ChannelFilter | None, Cha
 
 def create_run_journal(port: PortSettings, settings: RunSettings, metadata: RunMetadata) -> Journal:
     """Create the journal of a run beside the file that the run will have. Raises JournalError."""
-    began = metadata.format_start("%Y%m%dT%H%M%S")
-    parts = (began, metadata.series or "run", str(os.getpid()), str(time.perf_counter_ns() // 1_000_000))
+    stem = run_stem(metadata.start_time, metadata.series or "run")
+    parts = (stem, str(os.getpid()), str(time.perf_counter_ns() // 1_000_000))
     path = Path(settings.directory).absolute() / ("_".join(parts) + SUFFIX)
     header = JournalHeader(port, settings, metadata, str(uuid.uuid4()), f"slipstand {__version__}")
     return create_journal(path, header, journal_fallback_folders())

@@ -1,6 +1,7 @@
 """Where runs are kept."""
 
 import contextlib
+import datetime
 import errno
 import getpass
 import os
@@ -20,14 +21,19 @@ TRASH = ".trash"  # folder beside runs that holds those moved to the trash
 RECORDINGS = "SLIPSTAND_RECORDINGS"  # variable that says where runs are kept, before all settings
 
 
-def next_run_number(folder: Path, stem: str) -> int:
-    """Number after that of the last run of a series in a folder.
+def run_stem(start_time: datetime.datetime | None, series: str | None) -> str:
+    """What stands before the number in the name of a run: `20261121T143205_1FFM0`."""
+    start = "" if start_time is None else start_time.strftime("%Y%m%dT%H%M%S")
+    return f"{start}_{series}" if series else start
 
-    `stem` is what stands before the number in a name: start and series, or the start alone of a run without
-    a series. A folder that cannot be listed has no runs.
+
+def next_run_number(folder: Path, series: str | None) -> int:
+    """Number after that of the last run of a series in a folder, or of the last run without a series.
+
+    A folder that cannot be listed has no runs.
     """
-    _, has_series, series = stem.partition("_")
-    name = re.compile(rf"\d{{8}}T\d{{6}}{has_series}{re.escape(series)}_(\d{{3,5}})\.h5")
+    of_series = f"_{re.escape(series)}" if series else ""
+    name = re.compile(rf"\d{{8}}T\d{{6}}{of_series}_(\d{{3,5}})\.h5")
     with contextlib.suppress(OSError):
         found = [name.fullmatch(entry.name) for entry in folder.iterdir()]
         return max((int(match[1]) for match in found if match), default=0) + 1

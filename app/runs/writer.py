@@ -29,7 +29,7 @@ from app.runs.fields import fill_fields
 from app.runs.journal import JournalSpan, RecordKind, UnreadableJournalError, read_journal
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.metadata import EndMetadata, RunMetadata
-from app.runs.paths import next_run_number
+from app.runs.paths import next_run_number, run_stem
 from app.runs.writer_client import ERRORS, Closed, Failed, FrameDecoder, Opened, OpenRun, Reply, WriterCommand
 from config.durable_files import remove_file, replace_file, sync_folder
 from drivers.samples import Losses
@@ -51,9 +51,8 @@ def create_run_in(
     Runs of a series are numbered in their order. Raises RunError.
     """
     disk.make_folder(folder)
-    began = metadata.format_start("%Y%m%dT%H%M%S")
-    stem = f"{began}_{metadata.series}" if metadata.series else began
-    first = next_run_number(folder, stem)
+    stem = run_stem(metadata.start_time, metadata.series)
+    first = next_run_number(folder, metadata.series)
     for number in range(first, first + _NAMES_MAX):
         try:
             path = folder / f"{stem}_{number:03d}{schema.SUFFIX}"

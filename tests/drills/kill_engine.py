@@ -1,11 +1,10 @@
 """Drill: the engine is killed at a random moment of a run; `python -m tests.drills.kill_engine --count 200`.
 
 After each kill the file must open as it was left, and `recover` must give a run whose every row is what the
-stand sent at that place. Lost is what the stand had sent when it was asked, just before the kill; what the
-engine waited for a core meanwhile is allowed besides, since nobody reads then. A quarter of the moments
-lies in the making of the run file, half of them in one of its flushes, both with the writer, so that nobody
-closes the file; the others fall anywhere from arming to closing, half of them with the writer. No process
-of the dead engine may stay.
+stand sent at that place. Lost is what the stand had sent when it was asked, just before the kill. A quarter
+of the moments lies in the making of the run file, half of them in one of its flushes, both with the writer,
+so that nobody closes the file; the others fall anywhere from arming to closing, half of them with the writer.
+No process of the dead engine may stay.
 """
 
 import contextlib
@@ -36,7 +35,7 @@ from app.simulated_stand.options import SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import settings_file
 from drivers.simulated.stream_sender import TransmissionLog
-from tests.drills.processes import children_of, gone, waited_for_a_core_s
+from tests.drills.processes import children_of, gone
 from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
 from tests.drills.starving import Starving
@@ -106,8 +105,6 @@ class Kill:
     """Processes that the engine had."""
     with_writer: bool
     """They were killed too."""
-    waited_s: float
-    """How long threads of the engine waited for a core since it was armed."""
 
 
 def kill_engine(
@@ -160,7 +157,6 @@ def _one_kill(
     with_writer = aim is not Aim.ANYWHERE or moments.random() < 0.5
     with EngineClient.start(port, *files) as engine:
         _wait_for(engine, Connected)
-        waited_before_s = waited_for_a_core_s(engine.process_id)
         # A hold that has begun when armed is waited out: at most one cycle of the stand.
         engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger=kind, duration_s=DURATION_S)))
         if aim is Aim.ANYWHERE:
@@ -172,14 +168,13 @@ def _one_kill(
         sent = ask(stand).wire
         if aim is Aim.FLUSH:
             _await_write(folder, moments.uniform(0.0, 1e-3))
-        waited_s = max(0.0, waited_for_a_core_s(engine.process_id) - waited_before_s)
         for process_id in children if with_writer else ():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process_id, signal.SIGKILL)
         os.kill(engine.process_id, signal.SIGKILL)
         killed_s = time.monotonic()
         _wait_for(engine, Failed)
-        return Kill(folder, sent, killed_s, time.monotonic() - killed_s, children, with_writer, waited_s)
+        return Kill(folder, sent, killed_s, time.monotonic() - killed_s, children, with_writer)
 
 
 def _await_file(folder: Path, patience_s: float = 60.0) -> None:
@@ -235,7 +230,7 @@ def _check(killed: Kill, unread_s: float, stand: SimulatedStand, sent: Sent, rep
     if run.end is not None and run.end.ended == "interrupted":
         lost_s = max(0, killed.sent.samples - next_sample) / killed.sent.rate_hz
         report.lost_s.append(max(0.0, lost_s - unread_s))
-        if report.lost_s[-1] > LOST_LIMIT_S + killed.waited_s:
+        if report.lost_s[-1] > LOST_LIMIT_S:
             raise ValueError(f"the last {report.lost_s[-1] * 1e3:.0f} ms before the kill are lost")
 
 

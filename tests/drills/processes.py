@@ -24,15 +24,6 @@ def descendants_of(process_id: int) -> list[int]:
     return found + [further for child in found for further in descendants_of(child)]
 
 
-def waited_for_a_core_s(process_id: int) -> float:
-    """How long the threads of a process were ready to run and had no core, together; 0 where nobody tells."""
-    waited_ns = 0
-    for told in Path("/proc").glob(f"{process_id}/task/*/schedstat"):
-        with contextlib.suppress(OSError):  # ended meanwhile
-            waited_ns += int(told.read_text().split()[1])
-    return waited_ns * 1e-9
-
-
 def gone(process_id: int, patience_s: float = PATIENCE_S) -> bool:
     """Wait until a process has ended; one that waits to be collected has."""
     deadline = time.perf_counter() + patience_s

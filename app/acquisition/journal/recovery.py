@@ -30,7 +30,7 @@ from app.runs.file_operations import (
 )
 from app.runs.journal import find_journals, has_record_behind
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
-from app.runs.paths import next_run_number
+from app.runs.paths import next_run_number, run_stem
 from app.runs.schema import SUFFIX
 from config.durable_files import remove_file, sync_folder
 from messages.i18n import N_
@@ -138,8 +138,8 @@ def _recover(summary: JournalSummary, place: Path, progress: Progress) -> Recove
     _await_writer(summary, place)
     earlier = _earlier_file(summary, place)
     with _workshop(place, summary.path.stem) as folder:
-        stem = _stem(summary)
-        made = folder / (earlier.name if earlier else f"{stem}_{next_run_number(place, stem):03d}{SUFFIX}")
+        number = next_run_number(place, summary.header.metadata.series)
+        made = folder / (earlier.name if earlier else f"{_stem(summary)}_{number:03d}{SUFFIX}")
         rebuilt = rebuild(summary, made, progress)
         if rebuilt is None:
             template = N_("{path} holds {bytes} bytes but no sample. Delete it if it is not needed")
@@ -229,7 +229,7 @@ def _stem(summary: JournalSummary) -> str:
     """Begin of the name that the writer gives to the run file."""
     metadata = summary.header.metadata
     start = summary.opened.start_time if summary.opened else metadata.known_start_time
-    return "_".join(part for part in (start.strftime("%Y%m%dT%H%M%S"), metadata.series) if part)
+    return run_stem(start, metadata.series)
 
 
 @contextlib.contextmanager

@@ -13,11 +13,13 @@ from analysis.campaign.pooling import PooledQuantity
 from analysis.campaign.rows import STATIC_LOWER, STATIC_UPPER, SeriesRow
 from analysis.catalogue import Place, QuantityDefinition, table_columns
 from analysis.formatting import (
+    NO_BREAK_SPACE,
     format_concise,
     format_fixed,
     format_interval,
     format_signed,
     format_value,
+    unbreakable,
     uncertainty_decimals,
 )
 from analysis.quantities import Quantity, ResultWarning
@@ -129,7 +131,6 @@ def _bounds(row: SeriesRow) -> str:
 
 
 _GAP: Final = "  "
-_UNBROKEN: Final = "\u00a0%"
 _SAID, _NAMED = 3, 12  # series for which a warning is printed in full, and that are named
 LEGEND: Final = (
     "In parentheses: standard uncertainty of the last digits. * a run is far from the others, ! no friction"
@@ -290,8 +291,8 @@ def _fitting(widths: Sequence[int], width: int) -> Iterator[list[int]]:
 
 
 def _wrapped(text: str, width: int, begin: str = "") -> list[str]:
-    """Lines of a sentence, without a break before a percent sign."""
+    """Lines of a sentence, of which none ends inside a value."""
     wrapper = textwrap.TextWrapper(
         width, begin, " " * len(begin), break_long_words=False, break_on_hyphens=False
     )
-    return [line.replace(_UNBROKEN, " %") for line in wrapper.wrap(text.replace(" %", _UNBROKEN))]
+    return [line.replace(NO_BREAK_SPACE, " ") for line in wrapper.wrap(unbreakable(text))]

@@ -10,7 +10,7 @@ import msgspec
 import typst
 from matplotlib.ft2font import FT2Font
 
-from analysis.formatting import NO_BREAK_SPACE
+from analysis.formatting import unbreakable
 from app.reports.figures.style import typeface_files
 from app.reports.test_report.blocks import Report
 from app.runs.disk import atomic_write
@@ -18,7 +18,6 @@ from app.runs.errors import WriteError
 
 PDF_STANDARD: Final = "a-2a"  # PDF/A-2 level a: archival, with the structure that screen readers need
 _LONG_WORD = re.compile(r"\S{48}(?=\S)")
-_SPACED_PERCENT = re.compile(r"(?<=\d) %")
 _BREAK = "\u200b"
 _ALWAYS = frozenset("\n\u200b\u00a0\u202f")
 
@@ -67,7 +66,7 @@ def printable(text: str) -> str:
         sign if sign in _ALWAYS or ord(sign) in known else f"[U+{ord(sign):04X}]"
         for sign in text.replace("\r\n", "\n").replace("\r", "\n").replace("\t", " ")
     )
-    return _LONG_WORD.sub(lambda word: word[0] + _BREAK, _SPACED_PERCENT.sub(f"{NO_BREAK_SPACE}%", shown))
+    return _LONG_WORD.sub(lambda word: word[0] + _BREAK, unbreakable(shown))
 
 
 def _printable(value: Any, key: str = "") -> Any:

@@ -50,7 +50,7 @@ def test_quitting_ends_a_run_and_keeps_it(tmp_path, shared):
     engine.close()
     assert any(isinstance(event, RunEnded) for event in engine.poll())
     assert engine.has_ended
-    assert len(closed_run(tmp_path)) > 0  # how many, a busy computer decides
+    assert len(closed_run(tmp_path)) > 500
     assert gone(engine.process_id)
 
 

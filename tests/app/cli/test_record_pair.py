@@ -39,8 +39,6 @@ def skip_where_polls_were_late(recorded: dict[str, Any]) -> None:
         assert "quasi-static" in recorded["message"]
         pytest.skip(f"this computer is too busy to poll: {recorded['rate_hz']:g} Hz miss the release")
     late = (recorded["missing"] + recorded["damaged"]) / recorded["samples"]
-    if late and recorded["ended"] == "trigger-timeout":
-        pytest.skip(f"this computer is too busy to see a release: {late:.0%} of its polls were late")
     if late > 0.1:
         assert "too busy to poll" in recorded["message"]
         pytest.skip(f"this computer is too busy for its polls: {late:.0%} of them were late")
