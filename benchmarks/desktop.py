@@ -32,6 +32,7 @@ from app.presenters.identify.state import ChannelCurves, Curves, ReadingUnit
 from app.presenters.record.live import LiveTraces
 from app.presenters.record.state import Action
 from app.presenters.screens import Screen
+from app.qt import main as desktop
 from app.qt.identify.curve_plots import CurvePlots
 from app.qt.record.live_plots import LivePlots
 from app.qt.theme import Theme
@@ -202,6 +203,7 @@ def zoom_and_pan(app: QApplication, theme: Theme, frames: Frames, count: int) ->
         QTest.qWaitForWindowExposed(plots)  # without, X may not have it yet and nothing is painted
         app.processEvents()
         plots._stack.reset_view()
+        desktop.exempt_from_collection()  # as the window does two seconds after its start
         (view,) = plots.findChildren(pg.GraphicsView)
         for what, gesture in (("zoom", zoom), ("pan", pan)):
             frames.clear()

@@ -1,6 +1,7 @@
 """Main function of the window."""
 
 import datetime
+import gc
 import os
 import signal
 import sys
@@ -123,9 +124,16 @@ def _run(
     else:
         QTimer.singleShot(0, window, first)
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
+    QTimer.singleShot(_WARM_UP_MS, window, exempt_from_collection)
     QTimer.singleShot(0, window, presenter.ask_to_recover)
     code = app.exec()
     return _INTERRUPTED if interrupts else code
+
+
+def exempt_from_collection() -> None:
+    """Leave all that exists out of later garbage collections: they take place between frames."""
+    gc.collect()
+    gc.freeze()
 
 
 def _has_display() -> bool:

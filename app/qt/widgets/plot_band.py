@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from PySide6.QtCore import QRectF
+from PySide6.QtCore import QPointF, QRectF, QSizeF
 from PySide6.QtGui import QColor, QImage, QPainter, QTransform
 
 from app.presenters.decimated_history import Polyline
@@ -26,8 +26,9 @@ class Band:
         self._starts_s = self._low = self._high = np.empty(0)
         self._end_s = 0.0
         self._made_for: tuple[object, ...] = ()
-        self._image = QImage()
-        self._pixels = np.empty((0, 0), np.uint32)  # of the image, which does not own them
+        self._strips: list[tuple[QPointF, QImage]] = []
+        self._full = QRectF()
+        self._pixels = np.empty(0, np.uint32)  # of the pictures, which do not own them
 
     def show_line(self, line: Polyline) -> None:
         """Draw another line from now on, of two spans at least."""
@@ -45,7 +46,9 @@ class Band:
             self._draw(transform, place, ratio, ink)
         painter.save()
         painter.resetTransform()
-        painter.drawImage(place.topLeft(), self._image)
+        for corner, image in self._strips:
+            painter.drawImage(corner, image)
+        painter.fillRect(self._full, ink)
         painter.restore()
 
     def _draw(self, transform: QTransform, place: QRectF, ratio: float, ink: QColor) -> None:
@@ -56,23 +59,47 @@ class Band:
             for values in (self._high, self._low)
         )
         columns = np.flatnonzero((np.arange(width) + 1.0 > x[0]) & (np.arange(width) < x[-1]))
-        tops, bottoms = _columns(columns, x, highest, lowest)
-        # A row is filled from the first to the last of its column: one comparison, since whole numbers wrap.
-        top_rows, row_counts = np.zeros((2, width), np.uint16)
-        top_rows[columns] = tops.clip(0, height)
-        row_counts[columns] = bottoms.clip(0, height) - top_rows[columns]
-        if self._pixels.shape != (height, width):
-            self._pixels = np.empty((height, width), np.uint32)
-            # In the format of the screen: Qt would convert another one in other threads, and wait for them.
-            self._image = QImage(
-                self._pixels.data, width, height, 4 * width, QImage.Format.Format_ARGB32_Premultiplied
-            )
-        rows = np.arange(height, dtype=np.uint16)[:, np.newaxis]
-        for first in range(0, height, _BLOCK_ROWS):
-            block = slice(first, first + _BLOCK_ROWS)
-            is_filled = (rows[block] - top_rows < row_counts).view(np.uint8)
-            np.multiply(is_filled, _premultiplied(ink), out=self._pixels[block], dtype=np.uint32)
-        self._image.setDevicePixelRatio(ratio)
+        self._strips, self._full = [], QRectF()
+        if not len(columns):
+            return
+        tops, ends = (rows.clip(0, height) for rows in _columns(columns, x, highest, lowest))
+        left = place.left() + columns[0] / ratio
+        full = range(int(tops.max()), int(ends.min()))  # rows that all columns fill
+        if full:
+            corner = QPointF(left, place.top() + full.start / ratio)
+            self._full = QRectF(corner, QSizeF(len(columns), len(full)) / ratio)
+        ragged = _ragged_rows(range(int(tops.min()), int(ends.max())), full)
+        if len(self._pixels) < (needed := len(columns) * sum(map(len, ragged))):
+            self._pixels = np.empty(needed, np.uint32)
+        pixels = self._pixels
+        for rows in ragged:
+            part, pixels = np.split(pixels, [len(rows) * len(columns)])
+            image = _fill(part.reshape(len(rows), len(columns)), rows, tops, ends, _premultiplied(ink))
+            image.setDevicePixelRatio(ratio)
+            self._strips.append((QPointF(left, place.top() + rows.start / ratio), image))
+
+
+def _ragged_rows(rows: range, full: range) -> list[range]:
+    """Those of `rows` above and below the `full` ones."""
+    parts = [range(rows.start, full.start), range(full.stop, rows.stop)] if full else [rows]
+    return [part for part in parts if part]
+
+
+def _fill(
+    pixels: NDArray[np.uint32], rows: range, tops: NDArray[np.intp], ends: NDArray[np.intp], ink: np.uint32
+) -> QImage:
+    """Picture in `pixels` (rows, columns), each column with ink from its top to its end."""
+    # A row is filled from the first to the last of its column: one comparison, since whole numbers wrap.
+    first = tops.astype(np.uint16)
+    counts = (ends - tops).astype(np.uint16)
+    numbers = np.arange(rows.start, rows.stop, dtype=np.uint16)[:, np.newaxis]
+    for start in range(0, len(rows), _BLOCK_ROWS):
+        block = slice(start, start + _BLOCK_ROWS)
+        is_filled = (numbers[block] - first < counts).view(np.uint8)
+        np.multiply(is_filled, ink, out=pixels[block], dtype=np.uint32)
+    height, width = pixels.shape
+    # In the format of the screen: Qt would convert another one in other threads, and wait for them.
+    return QImage(pixels.data, width, height, 4 * width, QImage.Format.Format_ARGB32_Premultiplied)
 
 
 def _columns(

@@ -17,8 +17,6 @@ Floats = NDArray[np.float64]
 
 _DENSE_STROKES = 100.0
 """A line of extremes that crosses the plot this often is drawn as a band: much faster, and looks alike."""
-_SMOOTH_STROKES = 4.0
-"""Length of the edges of a band, in heights of the plot, up to which Qt fills it fastest as a polygon."""
 _EDGE_PX = 8
 """Width of the spans of the edges of a band: several swings have room in one that cannot be told apart."""
 
@@ -35,11 +33,6 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
         self._band = Band()
         self._is_band = False
 
-    def setPen(self, *arguments: Any, **options: Any) -> None:  # noqa: N802
-        super().setPen(*arguments, **options)
-        if self.opts["fillLevel"] is not None:
-            self.setBrush(self.opts["pen"].color())
-
     def viewTransformChanged(self) -> None:  # noqa: N802
         """As pyqtgraph, and forget what was in view, which it remembers for items."""
         self._cachedView = None
@@ -47,7 +40,7 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def boundingRect(self) -> QRectF:  # noqa: N802
         """All that is in view: pyqtgraph looks for the extremes of all points anew at each step of a zoom."""
-        return QRectF(self.viewRect()) if len(self.xData) else QRectF()
+        return QRectF(self.viewRect()) if len(self._polyline.time_s) else QRectF()
 
     def samples(self) -> tuple[Floats, Floats]:
         """All points (n,), which a table of the plot has."""
@@ -68,45 +61,24 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def show_polyline(self, line: Polyline) -> None:
         """Draw a line; one of lowest and highest values as a band, where strokes could not be told apart."""
-        self._polyline, self._is_band = line, False
-        if not self._is_dense(line):
-            self._show_strokes(line, is_dense=False)
-        elif not line.is_min_max:
-            self._show_strokes(line, is_dense=True)
-        elif self._strokes(_edges(line)) < _SMOOTH_STROKES and not line.has_gaps:
-            self._show_polygon(line)
-        else:
-            self._is_band = True
+        is_dense = self._strokes(line) > _DENSE_STROKES
+        self._polyline, self._is_band = line, is_dense and line.is_min_max
+        if self._is_band:
             self._band.show_line(line)
-            self._show_strokes(line, is_dense=True)
+            self.prepareGeometryChange()
+            self.update()
+        else:
+            smooth = {"connect": "finite" if line.has_gaps else "all", "antialias": not is_dense}
+            self.setData(line.time_s, line.value, skipFiniteCheck=True, **smooth)
 
     def paint(self, painter: QPainter, *arguments: Any) -> None:
-        is_picture = painter.paintEngine().type() == QPaintEngine.Type.Raster
-        if not (self._is_band and is_picture):  # a drawing has strokes
+        if not self._is_band:
             super().paint(painter, *arguments)
-        else:
+        elif painter.paintEngine().type() == QPaintEngine.Type.Raster:
             self._band.paint(painter, self.getViewBox().viewRect(), self.opts["pen"].color())
-
-    def _show_strokes(self, line: Polyline, *, is_dense: bool) -> None:
-        connect = "finite" if line.has_gaps else "all"
-        smooth = {"antialias": not is_dense, "fillLevel": None}
-        self.setData(line.time_s, line.value, connect=connect, skipFiniteCheck=True, **smooth)
-
-    def _show_polygon(self, line: Polyline) -> None:
-        """Fill between the lowest and the highest value of each span."""
-        low, high = line.value[::2], line.value[1::2]
-        self.setData(
-            np.concatenate((line.time_s[::2], line.time_s[::-2])),
-            np.concatenate((low, high[::-1])),
-            connect="all",
-            skipFiniteCheck=True,
-            fillLevel="enclosed",
-            brush=self.opts["pen"].color(),
-            antialias=False,
-        )
-
-    def _is_dense(self, line: Polyline) -> bool:
-        return self._strokes(line) > _DENSE_STROKES
+        else:  # a drawing has strokes
+            painter.setPen(self.opts["pen"])
+            painter.drawPath(pg.arrayToQPath(self._polyline.time_s, self._polyline.value, connect="finite"))
 
     def _strokes(self, line: Polyline) -> float:
         """Length of a line in heights of the plot."""
@@ -159,7 +131,9 @@ class Line(Curve):
             return
         line = self._line.thinned(*part, pixels)
         self.show_polyline(
-            _edges(self._line.part(*part, pixels // _EDGE_PX)) if self._is_dense(line) else line
+            _edges(self._line.part(*part, pixels // _EDGE_PX))
+            if self._strokes(line) > _DENSE_STROKES
+            else line
         )
 
 

@@ -361,14 +361,31 @@ class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         return None if specs is None else (specs[0], [], specs[2])
 
     def tickValues(self, minVal: float, maxVal: float, size: float) -> Any:  # noqa: N802
-        """As pyqtgraph, which asks several times for the same."""
+        """Interval and ticks of each level, without those of the levels before, as pyqtgraph counts them.
+
+        Its own arithmetic with arrays takes ten times as long for so few; it asks several times for the same.
+        """
         asked = (minVal, maxVal, size)
         if asked != self._known[0]:
-            self._known = asked, super().tickValues(minVal, maxVal, size)
+            low, high = sorted((minVal * self.scale, maxVal * self.scale))
+            levels: list[tuple[float, list[float]]] = []
+            for spacing, _ in self.tickSpacing(low, high, size):
+                ticks = [n * spacing for n in range(math.ceil(low / spacing), math.floor(high / spacing) + 1)]
+                coarser = [interval for interval, _ in levels]
+                levels.append((spacing, [tick for tick in ticks if not _is_multiple(tick, spacing, coarser)]))
+            self._known = (
+                asked,
+                [(spacing / self.scale, [tick / self.scale for tick in ticks]) for spacing, ticks in levels],
+            )
         return self._known[1]
 
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:  # noqa: N802
         return [typeset(text) for text in super().tickStrings(values, scale, spacing)]
+
+
+def _is_multiple(tick: float, spacing: float, intervals: Sequence[float]) -> bool:
+    """Whether a tick is at a multiple of one of the intervals, to a hundredth of its spacing."""
+    return any(abs(math.remainder(tick, interval)) <= 0.01 * spacing for interval in intervals)
 
 
 def value_at(time_s: Floats, values: Floats, at_s: float) -> float:

@@ -134,7 +134,9 @@ def test_the_command_that_probe_prints_records_from_the_defaults_of_the_simulate
         assert np.mean(readings == readings.max()) < 0.01
         assert np.mean(np.diff(readings) == 0) < 0.05
     (analysis,) = slipstand("analyze", recorded["run"], "--json").json
-    assert analysis["results"]["friction_dynamic"]["value"] == pytest.approx(true, rel=0.01)
+    found = analysis["results"]["friction_dynamic"]
+    # Two streams that a busy computer could time only roughly have an uncertainty that says so.
+    assert found["value"] == pytest.approx(true, abs=max(0.01 * true, found["expanded_uncertainty"])), found
 
 
 def skip_if_polls_were_late(recorded: dict[str, Any], is_polled: bool) -> None:
