@@ -116,11 +116,11 @@ run: setup
 		$(BIN)/slipstand demo; \
 	fi
 
-# In the order of tests/conftest.py: pytest-xdist would begin with the file that has most tests.
-BY_FILE := --dist loadfile --no-loadscope-reorder
+# By files, in the order of tests/conftest.py: pytest-xdist would begin with the one that has most tests. Those in
+# real time are few and long, so that a worker without any takes over from one that has many.
 test: compiled
-	$(BIN)/python -m pytest tests -m "not realtime" -n $(TEST_WORKERS) $(BY_FILE)
-	$(BIN)/python -m pytest tests -m realtime -n 4 $(BY_FILE)
+	$(BIN)/python -m pytest tests -m "not realtime" -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest tests -m realtime -n 4 --dist worksteal
 
 # With another Python, given by PYTHON, in an environment of its own. uv: pip takes minutes.
 QUICK_TESTS := tests/config tests/messages tests/app/test_child_process.py tests/app/test_version.py tests/app/runs/test_schema.py tests/app/runs/test_run_round_trip.py tests/app/runs/test_validation.py
