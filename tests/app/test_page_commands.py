@@ -1,13 +1,14 @@
 """Each command on a page is one of the program; those without a device are run, and outputs compared."""
 
 import contextlib
+import copy
 import io
 import pickle
 import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import pytest
 import typer
@@ -102,13 +103,13 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def kept_identifications() -> Iterator[None]:
     """Identify each record once: pages do so with the same three runs again and again."""
-    kept: dict[bytes, bytes] = {}
+    kept: dict[bytes, Identification] = {}
 
     def identify_once(record: Record, *, progress: Progress | None = None, **options: Any) -> Identification:
         key = pickle.dumps((record, options))
         if key not in kept:
-            kept[key] = pickle.dumps(identify(record, progress=progress, **options))
-        return cast("Identification", pickle.loads(kept[key]))
+            kept[key] = identify(record, progress=progress, **options)
+        return copy.deepcopy(kept[key])
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(analyze, "identify", identify_once)
