@@ -51,6 +51,10 @@ REALTIME_FILES = {
 
 # Files that take longest come first, so that no worker has one left when the others are done.
 LONGEST_FILES = (
+    "test_day_on_a_display.py",
+    "test_day_by_keys.py",
+    "test_record_pair.py",
+    "test_record_amplifiers.py",
     "test_wheel.py",
     "test_page_commands.py",
     "test_short_studies.py",
