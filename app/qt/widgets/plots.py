@@ -39,6 +39,8 @@ _CACHE_KB = 128 * 1024
 """Room for the pictures of axes and grids of a large screen; Qt's own 10 MB hold those of a small one."""
 
 _CENTRED = Qt.AlignmentFlag.AlignCenter
+_BESIDE = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+_BELOW = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
 _TEXT_HEIGHT = 0.8
 """Of what Qt says of a line of text: without the room between lines, as in pyqtgraph."""
 
@@ -387,6 +389,7 @@ class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
         room, largest = self.boundingRect(), QSizeF()
         texts: list[tuple[QRectF, Any, str]] = []
         gap = self.style["tickTextOffset"][0 if is_left else 1]
+        flags = Qt.TextFlag.TextDontClip | (_BESIDE if is_left else _BELOW)
         for ticks in self._levels(length):
             along = largest.height() if is_left else largest.width()
             if texts and self._is_crowded(len(texts), along * (len(texts) + len(ticks)) / length):
@@ -403,7 +406,7 @@ class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
                     place = QRectF(QPointF(0.0, bounds.top() + gap), size)
                     place.moveLeft(bounds.left() + share * length - size.width() / 2.0)
                 if room.contains(place):
-                    texts.append((place, _CENTRED | Qt.TextFlag.TextDontClip, text))
+                    texts.append((place, flags, text))
         self._updateMaxTextSize(largest.width() if is_left else largest.height())
         return line, [], texts
 
