@@ -17,7 +17,7 @@ from PySide6.QtGui import (
     QPixmapCache,
     QResizeEvent,
 )
-from PySide6.QtWidgets import QFrame, QGraphicsItem, QWidget
+from PySide6.QtWidgets import QFrame, QGraphicsItem, QGraphicsScene, QWidget
 
 from analysis.formatting import typeset, with_unit
 from app.presenters.curve_table import TableCurve
@@ -171,6 +171,8 @@ class PlotStack(QFrame):
         self.table: Callable[[], list[TableCurve]] = self.curves_in_view
         """What is saved as a table."""
         self._canvas = pg.GraphicsLayoutWidget()
+        # With each step of a zoom all items move: to file them anew takes longer than to look at all of them.
+        self._canvas.scene().setItemIndexMethod(QGraphicsScene.ItemIndexMethod.NoIndex)
         for part in (self._canvas, self._canvas.viewport()):
             part.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are for the whole plot
         self.plots = [Plot(self._canvas, row) for row in range(len(titles))]
