@@ -18,7 +18,7 @@ import msgspec
 import numpy as np
 
 from app.acquisition.journal.records import JournalHeader, Known, Mark, Opened
-from app.acquisition.journal.recovery import RecoveryState, recover_folder
+from app.acquisition.journal.recovery import Recovery, RecoveryState, recover_folder
 from app.acquisition.messages import PortSettings, RunSettings
 from app.runs.blocks import BlockLayout
 from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal
@@ -44,7 +44,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as place:
         journal = Path(place) / "20260101T000000.journal"
         write_journal(journal, counts, options.rate)
-        rows = [*floor(journal, counts, options.rate), ("recover", *timed(lambda: recover(journal, counts)))]
+        found: list[Recovery] = []
+        rows = floor(journal, counts, options.rate)
+        rows.append(("recover", *timed(lambda: found.extend(recover_folder(journal.parent)))))
+        check(found, counts)
     print(f"| {options.minutes:g} minutes at {options.rate:g} Hz | processor time, s | elapsed, s |")
     print("|---|---|---|")
     for name, processor_s, elapsed_s in rows:
@@ -111,12 +114,13 @@ def write_plain(folder: Path, counts: np.ndarray, data: bytes) -> None:
         file.create_dataset("wire", data=np.frombuffer(data, np.uint8), chunks=(1 << 18,), **packed)
 
 
-def recover(journal: Path, counts: np.ndarray) -> None:
-    (recovery,) = recover_folder(journal.parent)
+def check(found: list[Recovery], counts: np.ndarray) -> None:
+    """Refuse figures of a run that is not whole."""
+    (recovery,) = found
     if recovery.state is not RecoveryState.RECOVERED:
         raise SystemExit(f"not recovered: {recovery}")
-    found = load_counts(open_run(recovery.run, trusted=True))
-    if found is None or not np.array_equal(found, counts):
+    stored = load_counts(open_run(recovery.run, trusted=True))
+    if stored is None or not np.array_equal(stored, counts):
         raise SystemExit(f"{recovery.samples} samples recovered that are not the {len(counts)} sent")
 
 
