@@ -77,12 +77,16 @@ class TextRole(Enum):
 
 
 def font(role: TextRole) -> QFont:
-    """Font of a role. Sizes are px on a screen of 96 dpi and follow the system's scaling of text."""
+    """Font of a role. Sizes are px on a screen of 96 dpi and follow the system's scaling of text.
+
+    Widths are those of the typeface. A system without a configuration of fonts would round those of letters.
+    """
     size_px, weight = role.value
     made = QFont(FAMILY)
     screen = QGuiApplication.primaryScreen()
     made.setPointSizeF(size_px * 72.0 / (screen.logicalDotsPerInchY() if screen else 96.0))
     made.setVariableAxis(QFont.Tag("wght"), weight)
+    made.setHintingPreference(QFont.HintingPreference.PreferVerticalHinting)
     return made
 
 
