@@ -3,6 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 READY := $(VENV)/.ready
+COMPILED := $(VENV)/.compiled
 # Tests wait for child processes now and then: one worker more than there are processors.
 TEST_WORKERS = $(shell $(PYTHON) -c 'import os; print(1 + (os.cpu_count() or 1))')
 # Without bytecode on disk each of some thousand child processes compiles its modules again.
@@ -20,7 +21,7 @@ DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 # What logs the system calls that the drill of a power cut rebuilds disks from, and mounts a disk that hangs.
 TEST_PACKAGES := strace bindfs gcc libc6-dev
 
-.PHONY: audit licences wheel drill-tools docs translations help setup run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
+.PHONY: audit licences wheel drill-tools test-tools docs translations help setup installed run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-environment quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -47,13 +48,22 @@ help:
 	@echo "make docs    the documentation site into docs/_build/html, which needs no network"
 	@echo "make translations   new texts into the catalogues of messages/locale"
 
-setup: $(READY)
+setup: $(COMPILED)
 
+installed: $(READY)
+
+# uv, which takes a fifth of pip's time, by its hashes; pip where there is none, or where only pip knows the index.
 $(READY): requirements.lock pyproject.toml setup.py | system-libraries
 	@$(PYTHON) -c 'import sys; sys.exit("error: Python %d.%d is too old. Install Python 3.11 or later and run: make setup PYTHON=python3.11" % sys.version_info[:2] if sys.version_info < (3, 11) else 0)'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	sed -n '/^uv==/,/[^\\]$$/p' requirements.lock >$(VENV)/uv.txt
+	{ $(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r $(VENV)/uv.txt && \
+		$(BIN)/python -m uv pip install --quiet --python $(BIN)/python --require-hashes -r requirements.lock; } || \
+		$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --quiet --no-deps --no-build-isolation --editable .
+	@touch $@
+
+$(COMPILED): $(READY)
 	@echo "Compiling the numerical code, so that no first test waits: about a minute"
 	@$(BIN)/python -m tools.compile_all
 	@touch $@
@@ -71,6 +81,10 @@ firmware-tools:
 
 desktop-tools:
 	@$(call install_packages,$(DESKTOP_TEST_PACKAGES),true)
+
+# All that tests need of the system, in one go.
+test-tools: | system-libraries
+	@$(call install_packages,$(FIRMWARE_PACKAGES) $(DESKTOP_TEST_PACKAGES) $(TEST_PACKAGES),true)
 
 # $(1): packages of Debian and Ubuntu that must be there, or one that provides them: Debian 13 and Ubuntu 24.04 have
 # libglib2.0-0t64 for libglib2.0-0. One whose triggers have still to run, while another is installed, is there. $(2): a command that may add to $$missing.
@@ -102,22 +116,26 @@ run: setup
 		$(BIN)/slipstand demo; \
 	fi
 
+# By files, in the order of tests/conftest.py: pytest-xdist would begin with the one that has most tests. Those in
+# real time are few and long, so that a worker without any takes over from one that has many.
 test: compiled
-	$(BIN)/python -m pytest tests -m "not realtime" -n $(TEST_WORKERS) --dist loadfile
-	$(BIN)/python -m pytest tests -m realtime -n 4 --dist loadfile
+	$(BIN)/python -m pytest tests -m "not realtime" -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest tests -m realtime -n 4 --dist worksteal
 
 # With another Python, given by PYTHON, in an environment of its own. uv: pip takes minutes.
 QUICK_TESTS := tests/config tests/messages tests/app/test_child_process.py tests/app/test_version.py tests/app/runs/test_schema.py tests/app/runs/test_run_round_trip.py tests/app/runs/test_validation.py
-quick-test: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
+quick-environment: installed
 	$(BIN)/python -m uv venv --quiet --clear --python $(PYTHON) build/quick
 	$(BIN)/python -m uv pip install --quiet --python build/quick --require-hashes -r requirements.lock
 	$(BIN)/python -m uv pip install --quiet --python build/quick --no-deps --no-build-isolation --editable .
+
+quick-test: quick-environment
 	build/quick/$(notdir $(BIN))/python -m pytest -m "not realtime" -n 2 --dist loadfile $(QUICK_TESTS)
 
 # Once, before processes that start at once would each do it.
-compiled: setup
+compiled: installed
 	@$(BIN)/python -m tools.compile_all
+	@touch $(COMPILED)
 
 lint: types
 	$(BIN)/ruff check .
@@ -127,10 +145,10 @@ lint: types
 
 types: types-host types-win32 types-darwin
 
-types-host: setup
+types-host: installed
 	$(BIN)/mypy
 
-types-win32 types-darwin: types-%: setup
+types-win32 types-darwin: types-%: installed
 	$(BIN)/mypy --platform $* --no-warn-unreachable --cache-dir .mypy_cache/$*
 
 bench: setup
@@ -172,7 +190,6 @@ windows: setup
 
 # KINDS: some of wheel, tarball, deb, windows.
 packages: setup
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check uv
 	$(BIN)/python -m tools.packages $(KINDS)
 
 try-packages: setup
@@ -208,5 +225,4 @@ study: setup
 		echo "== benchmarks.study_$$study"; $(BIN)/python -m benchmarks.study_$$study || exit 1; done
 
 lock: setup
-	$(BIN)/python -m pip install --quiet uv
 	$(BIN)/python -m uv pip compile --universal --generate-hashes --no-header --no-annotate --extra dev pyproject.toml -o requirements.lock

@@ -45,9 +45,18 @@ def _repeat(lost: Any) -> None:
     """Raise again, a moment later, what was lost in a place that cannot pass it on, as a callback of C."""
     if lost.exc_type is KeyboardInterrupt:
         _was_lost.set()
-        again = threading.Timer(_AGAIN_S, _thread.interrupt_main)
+        again = threading.Timer(_AGAIN_S, _interrupt_main)
         again.daemon = True
         again.start()
+
+
+def _interrupt_main() -> None:
+    """Also where it waits for the system: what `interrupt_main` notes is seen after the wait."""
+    main = threading.main_thread().ident
+    if sys.platform == "win32" or main is None:
+        _thread.interrupt_main()
+    else:
+        signal.pthread_kill(main, signal.SIGINT)
 
 
 def _handle(handler: Any) -> None:

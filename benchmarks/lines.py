@@ -127,6 +127,7 @@ class Feeder:
                 while lines:
                     lines = lines[os.write(device, lines) :]
                 self.flows.wait(BURST_S)
+            time.sleep(3600.0)  # the terminal stays open
         os.set_blocking(device, False)
         began_s, sent = time.perf_counter(), 0
         while True:

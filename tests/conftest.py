@@ -49,6 +49,39 @@ REALTIME_FILES = {
     "test_firmware_record.py",
 }
 
+# Files that take longest come first, so that no worker has one left when the others are done.
+LONGEST_FILES = (
+    "test_day_on_a_display.py",
+    "test_day_by_keys.py",
+    "test_record_pair.py",
+    "test_record_amplifiers.py",
+    "test_wheel.py",
+    "test_page_commands.py",
+    "test_short_studies.py",
+    "test_odd_records.py",
+    "test_identify_one_mass.py",
+    "test_test_report.py",
+    "test_public_package.py",
+    "test_real_stand.py",
+    "test_recovery.py",
+    "test_identify_screen.py",
+    "test_two_mass.py",
+    "test_degenerate_records.py",
+    "test_keyboard.py",
+    "test_stand_search.py",
+    "test_pullback.py",
+    "test_documentation.py",
+    "test_interrupts.py",
+    "test_foreign_text.py",
+    "test_watch_command.py",
+    "test_port_probe_simulated.py",
+    "test_record_decisions.py",
+    "test_saved_analyses.py",
+    "test_doctor_command.py",
+    "test_worker.py",
+    "test_run_window.py",
+)
+
 
 @pytest.fixture
 def use_language() -> Iterator[Callable[[str], None]]:
@@ -65,7 +98,12 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what runs in real time, and what meets a program that is not ours: `make peers` runs these."""
+    """Mark what runs in real time, and what meets a program that is not ours: `make peers` runs these.
+
+    Order the files for workers that are each given one after the other.
+    """
+    ranks = {name: rank for rank, name in enumerate(LONGEST_FILES)}
+    items.sort(key=lambda item: ranks.get(item.path.name, len(ranks)))
     for item in items:
         if item.path.name in REALTIME_FILES:
             item.add_marker(pytest.mark.realtime)

@@ -1,9 +1,12 @@
 """Each command on a page is one of the program; those without a device are run, and outputs compared."""
 
 import contextlib
+import copy
 import io
+import pickle
 import re
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +14,12 @@ import pytest
 import typer
 from typer.core import TyperGroup
 
+from analysis.identify import Identification, identify
+from analysis.record import Record
 from app.cli.commands import app
 from app.cli.errors import CommandError
+from app.runs import analyze
+from app.runs.analyze import Progress
 from tools import page_commands
 from tools.page_commands import COMPARED_ELSEWHERE, MADE, PAGES, PLACEHOLDER, ROOT, PageCommand, is_run
 
@@ -93,6 +100,28 @@ def stage(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def kept_identifications() -> Iterator[None]:
+    """Identify each record once: pages do so with the same three runs again and again."""
+    kept: dict[bytes, Identification] = {}
+
+    def identify_once(record: Record, *, progress: Progress | None = None, **options: Any) -> Identification:
+        key = pickle.dumps((record, options))
+        if key not in kept:
+            kept[key] = identify(record, progress=progress, **options)
+        return copy.deepcopy(kept[key])
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(analyze, "identify", identify_once)
+        yield
+
+
+@pytest.fixture(scope="module")
+def printed_before() -> dict[tuple[str, ...], list[list[str]]]:
+    """What commands printed: a page and its translations have the same ones."""
+    return {}
+
+
 def run_pages() -> list[str]:
     return sorted({command.page for command in COMMANDS if is_run(command)})
 
@@ -117,7 +146,13 @@ def printed_by(command: PageCommand, slipstand: Any) -> str:
 
 @pytest.mark.parametrize("page", run_pages())
 def test_commands_of_a_page_run_and_print_what_it_shows(
-    page: str, stage: Path, slipstand: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    page: str,
+    stage: Path,
+    slipstand: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    kept_identifications: None,
+    printed_before: dict[tuple[str, ...], list[list[str]]],
 ) -> None:
     """In their order, in a folder of their own, with the exit code of success and no word of a fault."""
     shutil.copytree(stage, tmp_path, dirs_exist_ok=True)
@@ -126,8 +161,11 @@ def test_commands_of_a_page_run_and_print_what_it_shows(
     monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(tmp_path / "recordings"))
     monkeypatch.setenv("SLIPSTAND_CONFIG", str(tmp_path / "settings"))
     commands = [command for command in COMMANDS if command.page == page and is_run(command)]
-    for command in commands[:1] if page in RUN_APART else commands:
-        printed = printed_by(command, slipstand).splitlines()
+    commands = commands[:1] if page in RUN_APART else commands
+    lines = tuple(command.line for command in commands)
+    if lines not in printed_before:
+        printed_before[lines] = [printed_by(command, slipstand).splitlines() for command in commands]
+    for command, printed in zip(commands, printed_before[lines], strict=True):
         for shown in command.shown:
             found = page_commands.faults(shown.lines, printed)
             assert found == [], f"{page}: {command.line}: run python -m tools.page_commands"

@@ -16,7 +16,7 @@ CHECK = GaugeCheck(
 )  # fmt: skip
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def metadata() -> RunMetadata:
     """A run of the shipped stand with everything known."""
     return create_metadata(

@@ -35,9 +35,9 @@ from messages.message import EMPTY
 CHANNELS = ("time_s", "table_displacement_m", "relative_displacement_m")
 
 
-@pytest.fixture(params=["even", "uneven"])
-def run(request, tmp_path, metadata):
-    """A run of awkward numbers: all digits, absent readings, counts, and an analysis kept in it."""
+@pytest.fixture(scope="module", params=["even", "uneven"])
+def stored_run(request, tmp_path_factory, metadata):
+    """A file of awkward numbers: all digits, absent readings, counts, and an analysis kept in it."""
     rng = np.random.default_rng(3)
     rows = block(0, 400, BlockLayout(counts="float64"))
     rows.readings[:] += rng.normal(size=rows.readings.shape) * 1e-5
@@ -47,10 +47,16 @@ def run(request, tmp_path, metadata):
     rows.status[9] = SampleStatus.OVERLOAD_TABLE
     if request.param == "uneven":
         rows.time_s[:] = np.sort(rng.uniform(0.0, 1.0, len(rows)))
-    path = tmp_path / "=run.h5"
+    path = tmp_path_factory.mktemp("stored") / "=run.h5"
     write_run(path, metadata, rows, ENDING.replace(time_base=TimeBase()))
     save_analysis(path, ANALYSIS, inputs_hash(to_record(open_run(path, trusted=True))))
-    return open_run(path, trusted=True)
+    return path
+
+
+@pytest.fixture
+def run(stored_run, tmp_path):
+    """A copy of that file, which the test may change."""
+    return open_run(shutil.copy(stored_run, tmp_path), trusted=True)
 
 
 def exported_file(run, name):
