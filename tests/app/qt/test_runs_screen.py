@@ -405,7 +405,7 @@ def test_files_of_other_programs_are_chosen_and_open_the_import_dialog(stage: St
     dialog.filesSelected.emit(["/elsewhere/x.csv"])
     dialog.close()
     assert stage.imports == 1
-    assert stage.calls("survey_file")[-1].arguments[0] == "/elsewhere/x.csv"
+    assert Path(stage.calls("survey_file")[-1].arguments[0]) == Path("/elsewhere/x.csv")
 
 
 def decimated(name: str, start_s: float, end_s: float, spans: int) -> Trace:
