@@ -1,6 +1,7 @@
 """Decisions on runs on Record: keep, repeat, discard, restore; stored plan and form."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -330,7 +331,7 @@ def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
     desk.record.dispatch(Action.ARM)
     assert desk.recorder.counts == [2]
     assert desk.record.state.status_bar.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
-    first, second = "/recordings/a.h5", "/recordings/b.h5"
+    first, second = str(Path(FOLDER, "a.h5")), str(Path(FOLDER, "b.h5"))
     desk.run(first, remaining=1)
     assert desk.record.state.choices.form.run_in_number == "8"
     assert desk.record.state.status_bar.run.text.endswith(", 1 more by themselves")
