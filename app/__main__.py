@@ -28,7 +28,7 @@ def _run() -> None:
     for name in _THREADS:  # small matrices: more threads only wait for each other
         os.environ.setdefault(name, "1")
     if getattr(sys, "frozen", False):
-        _keep_compiled_code_apart()
+        _keep_caches_apart()
         arguments = _run_if_child(arguments)
     if arguments == ["--version"]:
         from app.version import version_text
@@ -59,15 +59,16 @@ def _run_window(simulated: bool = False, run: str = "") -> None:
     sys.exit(run_window(simulated=simulated, run=run))
 
 
-def _keep_compiled_code_apart() -> None:
-    """Let numba keep what it compiles in a folder of ours.
+def _keep_caches_apart() -> None:
+    """Let numba keep what it compiles, and matplotlib its list of fonts, in a folder of ours.
 
     It would be that of the program or, where that cannot be written, one that all programs share.
     """
     import platformdirs
 
-    folder = platformdirs.user_cache_path("slipstand", appauthor=False) / "compiled"
-    os.environ.setdefault("NUMBA_CACHE_DIR", str(folder))
+    folder = platformdirs.user_cache_path("slipstand", appauthor=False)
+    os.environ.setdefault("NUMBA_CACHE_DIR", str(folder / "compiled"))
+    os.environ.setdefault("MPLCONFIGDIR", str(folder / "matplotlib"))
 
 
 def _run_if_child(arguments: list[str]) -> list[str]:

@@ -1,5 +1,6 @@
 """Theme: colours of both schemes, typeface, palette and style sheet."""
 
+import sys
 from dataclasses import asdict, dataclass
 from enum import Enum
 from pathlib import Path
@@ -77,12 +78,18 @@ class TextRole(Enum):
 
 
 def font(role: TextRole) -> QFont:
-    """Font of a role. Sizes are px on a screen of 96 dpi and follow the system's scaling of text."""
+    """Font of a role. Sizes are px on a screen of 96 dpi and follow the system's scaling of text.
+
+    Widths are those of the typeface: without a configuration of fonts, Linux would round those of letters.
+    Windows fits letters to pixels by itself.
+    """
     size_px, weight = role.value
     made = QFont(FAMILY)
     screen = QGuiApplication.primaryScreen()
     made.setPointSizeF(size_px * 72.0 / (screen.logicalDotsPerInchY() if screen else 96.0))
     made.setVariableAxis(QFont.Tag("wght"), weight)
+    if sys.platform != "win32":
+        made.setHintingPreference(QFont.HintingPreference.PreferVerticalHinting)
     return made
 
 

@@ -42,7 +42,8 @@ from messages.message import message
 
 RATE_HZ = 1000.0
 PULLED_S, HELD_S, RELEASED_S, SLIP_END_S, END_S = 2.0, 4.0, 5.0, 7.5, 15.0
-RUN = "/recordings/20260112_1FFM0_001.h5"
+FOLDER = str(Path("/recordings"))
+RUN = str(Path(FOLDER, "20260112_1FFM0_001.h5"))
 
 
 def bench() -> StandContext:

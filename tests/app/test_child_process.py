@@ -307,14 +307,15 @@ def test_a_process_sees_that_its_parent_has_ended():
     assert not watch_parent()()
 
 
-def test_a_frozen_build_keeps_compiled_code_in_the_folder_of_the_user():
-    """In its own folder a user may not write, and numba's common one is left when the program is removed."""
+@pytest.mark.parametrize("variable", ["NUMBA_CACHE_DIR", "MPLCONFIGDIR"])
+def test_a_frozen_build_keeps_caches_in_the_folder_of_the_user(variable):
+    """In its own folder a user may not write, and a common one is left when the program is removed."""
     program = (
         "import os, sys; sys.frozen = True; sys.argv = ['slipstand', '--version']\n"
         "from app.__main__ import main\n"
-        "main(); print(os.environ['NUMBA_CACHE_DIR'])"
+        f"main(); print(os.environ[{variable!r}])"
     )
-    variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    variables = {name: value for name, value in os.environ.items() if name != variable}
     done = subprocess.run(
         [sys.executable, "-c", program], env=variables, capture_output=True, text=True, check=True
     )

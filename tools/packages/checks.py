@@ -30,6 +30,8 @@ _KEPT = f"/home/{USER}/Documents/Slipstand"
 _OWN = (".cache", ".config", ".local/state")
 """Folders of a user that the program has one in, and that no package may remove from there."""
 _WINDOWS_FOLDER = "drive_c/Program Files/Slipstand"
+_OF_NSIS = "~nsu"
+"""Start of the name of its uninstaller's copy, which Windows removes when it is started next."""
 _WINDOWS_S = 1200.0
 _WINDOW_OF_WINDOWS = r"""
 rm -f /tmp/.X{display}-lock /tmp/.X11-unix/X{display}
@@ -132,6 +134,8 @@ def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
     prefix = environment.inside / "prefix"
     folder, inside = prefix / _WINDOWS_FOLDER, f"/opt/windows/prefix/{_WINDOWS_FOLDER}"
     before = len(list((prefix / "drive_c" / "users").rglob("*.h5")))
+    temporary = prefix / "drive_c" / "users" / "root" / "AppData" / "Local" / "Temp"
+    temporary_before = set(temporary.glob("*"))
     shutil.copy(DIST / INSTALLER_NAME, environment.inside / "setup.exe")
     yield _windows_step(environment, "install", ["wine", "/opt/windows/setup.exe", "/S"], _WINDOWS_S)
     for name in ("ucrtbase.dll", "ucrtw.dll", "icuuc.dll"):  # what Wine lacks, not Windows
@@ -162,7 +166,8 @@ def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
     users = prefix / "drive_c" / "users" / "root"
     own = (users / "Documents" / "Slipstand", users / "AppData" / "Local" / "slipstand")  # runs and settings
     kept = [path for path in left if any(path.is_relative_to(folder) for folder in own)]
-    strange = sorted(str(path.relative_to(prefix)) for path in left if path not in kept)
+    new = {path for path in temporary.glob("*") if not path.name.startswith(_OF_NSIS)} - temporary_before
+    strange = sorted(str(path.relative_to(prefix)) for path in {*left, *new} if path not in kept)
     runs = list((prefix / "drive_c" / "users").rglob("*.h5"))
     yield Check(
         "nothing is left but recordings", not strange, f"{len(runs)} runs kept; {strange or 'no trace'}"
@@ -262,7 +267,8 @@ def _nothing_left(system: BareDebian) -> Check:
     """Only recordings, and what is the user's own, which is removed by one command of the guide."""
     own = " ".join(f"{folder}/slipstand" for folder in _OWN)
     system.run(["sh", "-c", f"rm -rf {own}"], USER)
-    left = [path for path in system.traces() if path != _KEPT]
+    temporary = [str(path) for path in (system.layer / "tmp").glob("*")]
+    left = [path for path in system.traces() if path != _KEPT] + temporary
     runs = system.layer / _KEPT.lstrip("/") / "recordings"
     kept = len(list(runs.glob("*.h5")))
     return Check(

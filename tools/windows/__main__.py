@@ -26,11 +26,14 @@ def main() -> int:
         "port": lambda: checks.record_from_ports(environment),
         "kill": lambda: checks.kill(environment),
         "window": lambda: checks.window(environment, arguments.display, environment.folder / "results"),
-        "tests": lambda: checks.tests(environment, environment.folder / "results"),
+        "tests": lambda: checks.tests(environment, environment.folder / "results", arguments.parts),
     }
     parser = argparse.ArgumentParser(prog="python -m tools.windows", description=__doc__)
     parser.add_argument("steps", nargs="*", metavar="STEP", help=f"some of: {', '.join(steps)}")
     parser.add_argument("--folder", type=Path, default=default_folder(), help="where all is kept")
+    parser.add_argument(
+        "--parts", nargs="+", default=checks.TEST_PARTS, metavar="PART", help="files or folders of tests"
+    )
     parser.add_argument("--display", type=int, default=77, help="number of the display that is made")
     arguments = parser.parse_args()
     if unknown := set(arguments.steps) - set(steps):

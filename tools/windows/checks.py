@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -125,22 +125,23 @@ def window(environment: WindowsEnvironment, display: int, pictures: Path) -> Ite
         yield Check(f"window, {theme}", bool(runs) and len(taken) == 2, figures.strip())
 
 
-def tests(environment: WindowsEnvironment, logs: Path) -> Iterator[Check]:
+def tests(environment: WindowsEnvironment, logs: Path, parts: Sequence[str]) -> Iterator[Check]:
     """Run the tests by parts. Those in real time that need a pseudo-terminal skip themselves."""
     logs.mkdir(parents=True, exist_ok=True)
     environment.run_python("-m", "tools.compile_all", timeout_s=_TESTS_S)
-    for part in TEST_PARTS:
+    for part in parts:
         log = logs / f"{part.replace('/', '-').removesuffix('.py')}.log"
         try:
             ended = environment.run_python(
-                "-m", "pytest", "-m", "not peer and not realtime", "-rfE", "--tb=short", "--timeout",
+                "-m", "pytest", "-vv", "-m", "not peer and not realtime", "-rfE", "--tb=short", "--timeout",
                 f"{_TEST_S:g}", "--ignore", _DASK, part, timeout_s=_TESTS_S,
             )  # fmt: skip
-        except subprocess.TimeoutExpired:
+        except subprocess.TimeoutExpired as error:
+            log.write_bytes(error.output or b"")
             yield Check(part, False, f"not done after {_TESTS_S:g} s")
             continue
         log.write_text(ended.stdout + ended.stderr, encoding="utf-8")
-        counts = re.findall(r"(?m)^(\d+ \w+.* in .*)$", ended.stdout)
+        counts = re.findall(r"(?m)^=+ (.* in [\d.]+s.*?) =+$", ended.stdout)
         yield Check(part, ended.returncode == 0, f"{counts[-1] if counts else 'no result'}; {log}")
 
 

@@ -3,6 +3,7 @@
 Debian 12's Wine 8 loads neither numpy nor Qt. Mirror and index are those that apt and pip use here.
 """
 
+import filecmp
 import hashlib
 import os
 import re
@@ -82,16 +83,24 @@ class WindowsEnvironment:
         self._make("prefix", " ".join(PORTS), self._make_prefix)
 
     def copy_project(self) -> None:
-        """Copy the files of the checkout, so that Windows' compiled code does not mix with that of Linux."""
+        """Copy the files of the checkout, so that Windows' compiled code does not mix with that of Linux.
+
+        A file that has not changed stays: code is compiled again where the time of its source is another.
+        """
         listed = subprocess.run(
             ["git", "ls-files", "-co", "--exclude-standard", "-z"],
             cwd=PROJECT, check=True, capture_output=True, text=True,
         ).stdout  # fmt: skip
+        copied = self.inside / "slipstand"
         for name in filter(None, listed.split("\0")):
-            source, target = PROJECT / name, self.inside / "slipstand" / name
+            source, target = PROJECT / name, copied / name
             if source.is_file() and not source.is_relative_to(PROJECT / "recordings"):
                 target.parent.mkdir(parents=True, exist_ok=True)
-                shutil.copy2(source, target)
+                if not (target.is_file() and filecmp.cmp(source, target, shallow=False)):
+                    shutil.copy2(source, target)
+        for left in copied.rglob("*.py"):  # tests of an earlier copy would be run
+            if not (PROJECT / left.relative_to(copied)).exists():
+                left.unlink()
 
     def prepare_builder(self, requirements: Path, wheel: Path, freezer: str) -> str:
         """Make a Python that has the program from its wheel and PyInstaller, and return its path inside."""

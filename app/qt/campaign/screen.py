@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QFileDialog, QFrame, QMenu, QPushButton, QStackedWidget, QVBoxLayout, QWidget
@@ -23,11 +24,12 @@ from messages.i18n import N_, gettext, ngettext
 _COLUMN_WIDTH = 360
 _TABLE_SHARE, _FIGURE_SHARE = 3, 2
 _WORDS_WIDTH = 200
-_TARGETS = {
-    Product.TABLE: (N_("Tables (*.csv *.json *.md *.tex *.txt *.xlsx)"), "table-1.xlsx"),
-    Product.FIGURES: ("", ""),
-    Product.REPORT: (N_("Reports (*.pdf)"), "report.pdf"),
+_TARGETS: dict[Product, tuple[str, tuple[str, ...]]] = {
+    Product.TABLE: ("table-1", ("xlsx", "csv", "json", "md", "tex", "txt")),
+    Product.FIGURES: ("", ()),
+    Product.REPORT: ("report", ("pdf",)),
 }
+"""Proposed name and suffixes; a folder has none. Each has a filter: Windows appends its first suffix."""
 
 
 class CampaignScreen(QWidget):
@@ -132,16 +134,27 @@ class CampaignScreen(QWidget):
         self._open_folder.show_folder(state.written_to)
 
     def _ask_for_target(self, product: Product) -> None:
-        kinds, name = _TARGETS[product]
+        name, suffixes = _TARGETS[product]
         export = partial(self._presenter.export, product)
         folder = self._presenter.recent.export_folder or self._shown.folder
-        if not kinds:
+        if not suffixes:
             ask_for_folder(self, gettext("Export"), folder, export)
             return
-        dialog = QFileDialog(self, gettext("Export"), folder, gettext(kinds))
+        dialog = QFileDialog(self, gettext("Export"), folder)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        dialog.selectFile(name)
+        filters = [f"{suffix.upper()} (*.{suffix})" for suffix in suffixes]
+        dialog.setNameFilters(filters)
+
+        def propose(chosen: str) -> None:
+            suffix = suffixes[filters.index(chosen)]
+            typed = [Path(path) for path in dialog.selectedFiles()]
+            stem = typed[0].stem if typed and typed[0].suffix else name
+            dialog.setDefaultSuffix(suffix)
+            dialog.selectFile(f"{stem}.{suffix}")
+
+        propose(filters[0])
+        dialog.filterSelected.connect(propose)
         connect_chosen(dialog, export)
         dialog.open()
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QDir, Qt
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import QFileDialog, QLineEdit, QStackedWidget, QWidget
 
@@ -110,7 +110,7 @@ class RunsScreen(QWidget):
             self._take_files(paths)
 
     def _take_files(self, paths: Sequence[str]) -> None:
-        if self._presenter.add_files(tuple(paths)):
+        if self._presenter.add_files(tuple(map(QDir.toNativeSeparators, paths))):
             self._dialogs.show_import()
 
     def _choose_files(self) -> None:

@@ -1,10 +1,11 @@
 """Decisions on runs on Record: keep, repeat, discard, restore; stored plan and form."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import msgspec
 import pytest
-from stage import RUN, FakeRecorder, FakeWorker, analysed, bench, ended, rows_between
+from stage import FOLDER, RUN, FakeRecorder, FakeWorker, analysed, bench, ended, rows_between
 
 from app.acquisition.messages import (
     Connected,
@@ -57,7 +58,7 @@ class Desk:
         self.record = RecordPresenter(self.recorder, around, self.worker, "me")  # type: ignore[arg-type]
         self.record.dispatch(Connecting("COM7"))
         assert self.tasks() == [LoadPlan(str(bench().directory))]
-        self.answer(LoadPlan("/recordings"), LoadedPlan(tests or NextTests(plan=PLAN), done))
+        self.answer(LoadPlan(FOLDER), LoadedPlan(tests or NextTests(plan=PLAN), done))
         self.record.dispatch(Connected("GSV-8", "1.2", 1000.0, "/ring"))
         self.come_to(PullbackState.IDLE)
         self.tasks()
@@ -120,7 +121,7 @@ def test_keeping_stores_what_was_found_and_counts_again() -> None:
         == "f<sub>d</sub> = 0.10030 ± 0.00064. Keeping 20260112_1FFM0_001"
     )
     desk.answer(task, RUN)
-    assert desk.tasks() == [CountCompletedRuns("/recordings")]
+    assert desk.tasks() == [CountCompletedRuns(FOLDER)]
     assert (
         desk.record.state.status_message.text == "f<sub>d</sub> = 0.10030 ± 0.00064. Kept 20260112_1FFM0_001"
     )
@@ -155,7 +156,7 @@ def test_discarding_moves_to_the_trash_and_back() -> None:
     assert desk.record.state.undo == ""
     desk.answer(RestoreFromTrash(TRASHED), "/recordings/20260112_1FFM0_001-2.h5")
     state = desk.record.state
-    assert desk.tasks() == [CountCompletedRuns("/recordings")], "nothing is decided yet"
+    assert desk.tasks() == [CountCompletedRuns(FOLDER)], "nothing is decided yet"
     assert state.decision == ""
     assert state.result is not None
     assert state.result.path == "/recordings/20260112_1FFM0_001-2.h5"
@@ -175,7 +176,7 @@ def test_what_was_kept_can_be_decided_about_again() -> None:
     assert desk.record.state.choices.series == "1FFM1", "the plan has gone on"
     assert desk.record.state.plan.done == 2
     desk.answer(desk.tasks()[0], RUN)
-    desk.answer(CountCompletedRuns("/recordings"), (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0")))
+    desk.answer(CountCompletedRuns(FOLDER), (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0")))
     desk.tasks()
     desk.record.dispatch(Action.UNDO)
     again = desk.record.state
@@ -242,7 +243,7 @@ def test_a_repeated_run_that_is_brought_back_meanwhile_is_kept() -> None:
     desk.record.dispatch(Action.UNDO)
     desk.answer(desk.tasks()[0], RUN)
     assert desk.record.state.result is None
-    assert desk.tasks() == [KeepRun(RUN, "me", None, has_results=True), CountCompletedRuns("/recordings")]
+    assert desk.tasks() == [KeepRun(RUN, "me", None, has_results=True), CountCompletedRuns(FOLDER)]
     assert desk.record.state.status_message.text == "Brought back 20260112_1FFM0_001: it counts again"
 
 
@@ -330,7 +331,7 @@ def test_of_runs_in_a_row_each_is_kept_and_the_last_is_asked_about() -> None:
     desk.record.dispatch(Action.ARM)
     assert desk.recorder.counts == [2]
     assert desk.record.state.status_bar.run.text == "1FFM0 run 1 of 2, 1 more by themselves"
-    first, second = "/recordings/a.h5", "/recordings/b.h5"
+    first, second = str(Path(FOLDER, "a.h5")), str(Path(FOLDER, "b.h5"))
     desk.run(first, remaining=1)
     assert desk.record.state.choices.form.run_in_number == "8"
     assert desk.record.state.status_bar.run.text.endswith(", 1 more by themselves")
@@ -473,7 +474,7 @@ def test_the_plan_counts_and_the_next_series_is_chosen_when_one_is_full() -> Non
     assert desk.record.state.status_bar.run.text == "1FFM0 run 2 of 2"
     desk.record.dispatch(Action.NEXT)
     done = (("/recordings/x.h5", "1FFM0"), (RUN, "1FFM0"))
-    desk.answer(CountCompletedRuns("/recordings"), done)
+    desk.answer(CountCompletedRuns(FOLDER), done)
     assert [one.dots for one in desk.record.state.plan.progress] == ["●●", "○"]
     assert desk.record.state.choices.series == "1FFM1"
     assert desk.record.state.status_bar.run.text == "1FFM1 run 1 of 1"
@@ -482,7 +483,7 @@ def test_the_plan_counts_and_the_next_series_is_chosen_when_one_is_full() -> Non
 def test_a_run_that_is_not_decided_about_does_not_count_yet() -> None:
     desk = Desk()
     desk.result()
-    desk.answer(CountCompletedRuns("/recordings"), ((RUN, "1FFM0"),))
+    desk.answer(CountCompletedRuns(FOLDER), ((RUN, "1FFM0"),))
     assert desk.record.state.plan.done == 0
     desk.record.dispatch(Action.NEXT)
     assert desk.record.state.plan.done == 1
@@ -491,7 +492,7 @@ def test_a_run_that_is_not_decided_about_does_not_count_yet() -> None:
 def test_the_simulated_stand_keeps_its_series_whatever_the_plan_says() -> None:
     desk = Desk()
     desk.record.dispatch(SimulationStarted("3SSM0", 0.2))
-    desk.answer(CountCompletedRuns("/recordings"), ())
+    desk.answer(CountCompletedRuns(FOLDER), ())
     assert desk.record.state.choices.series == "3SSM0"
 
 
@@ -556,7 +557,7 @@ def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
     (call,) = desk.worker.calls
     desk.worker.calls.clear()
     call.fail("next-tests.json: cannot be used. Mend it")
-    assert desk.tasks() == [CountCompletedRuns("/recordings")]
+    assert desk.tasks() == [CountCompletedRuns(FOLDER)]
     assert fresh.state.status_message.text == "next-tests.json: cannot be used. Mend it"
     fresh.dispatch(PlanEdited("1FFM0 x2"))
     assert desk.tasks() == []
@@ -565,7 +566,7 @@ def test_a_file_that_cannot_be_read_is_never_written_over() -> None:
 def test_runs_are_counted_anew_when_the_screen_is_shown_again() -> None:
     desk = Desk()
     desk.record.enter()
-    assert desk.tasks() == [CountCompletedRuns("/recordings")]
+    assert desk.tasks() == [CountCompletedRuns(FOLDER)]
 
 
 def test_tare_shows_from_here_and_changes_nothing_that_is_stored() -> None:
@@ -674,8 +675,8 @@ def test_the_choice_is_remembered_and_counts_the_folder_again() -> None:
     desk = Desk()
     assert not desk.record.state.plan.counts_simulated
     desk.record.dispatch(Settings(count_simulated=True))
-    assert desk.tasks() == [CountCompletedRuns("/recordings", counts_simulated=True)]
-    desk.answer(CountCompletedRuns("/recordings", counts_simulated=True), ((RUN, "1FFM0"),))
+    assert desk.tasks() == [CountCompletedRuns(FOLDER, counts_simulated=True)]
+    desk.answer(CountCompletedRuns(FOLDER, counts_simulated=True), ((RUN, "1FFM0"),))
     assert desk.record.state.plan.counts_simulated
     assert desk.record.state.plan.done == 1
     desk.record.dispatch(Settings(count_simulated=True, sounds=True))
@@ -688,4 +689,4 @@ def test_the_plan_is_loaded_with_what_was_chosen_before() -> None:
     record.dispatch(Settings(count_simulated=True))
     record.enter()
     (call,) = worker.calls
-    assert call.arguments == (LoadPlan("/recordings", counts_simulated=True),)
+    assert call.arguments == (LoadPlan(FOLDER, counts_simulated=True),)

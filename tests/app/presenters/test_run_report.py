@@ -11,7 +11,7 @@ from app.presenters.identify.report import ReportPresenter, ReportState
 from app.presenters.identify.report_tasks import render_run_report, write_run_report
 from app.presenters.recent import RecentItems
 
-RUN = "/recordings/20260112_1FFM0_001.h5"
+RUN = str(Path("/recordings/20260112_1FFM0_001.h5"))
 
 
 class Desk:
@@ -30,8 +30,8 @@ def test_the_next_report_goes_where_the_last_one_went(desk: Desk) -> None:
     assert desk.report.proposed_target == RUN.replace(".h5", ".pdf")
     desk.report.write("/reports/first.pdf")
     desk.worker.calls[-1].done("/reports/first.pdf")
-    assert desk.report.state.written_to == "/reports"
-    assert desk.report.proposed_target == "/reports/20260112_1FFM0_001.pdf"
+    assert Path(desk.report.state.written_to) == Path("/reports")
+    assert Path(desk.report.proposed_target) == Path("/reports/20260112_1FFM0_001.pdf")
 
 
 def test_why_no_report_could_be_made_is_said(desk: Desk) -> None:

@@ -2,6 +2,7 @@
 
 import datetime
 from collections.abc import Iterator
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -124,7 +125,8 @@ def test_a_run_that_cannot_be_identified_says_why_on_both_screens(desk: Desk) ->
 def test_a_recording_is_opened_on_identify(desk: Desk) -> None:
     desk.window.open_run("/recordings/a.h5")
     assert desk.window.state.screen is Screen.IDENTIFY
-    desk.analysis("/recordings/a.h5").done(analysed(path="/recordings/a.h5"))
+    opened = str(Path("/recordings/a.h5").absolute())
+    desk.analysis(opened).done(analysed(path=opened))
     assert desk.window.identify.state.title == "a.h5"
     assert desk.window.identify.state.result is not None
     assert desk.window.identify.state.result.comparison == "", "the truth of another run is not known"
@@ -481,7 +483,7 @@ def test_recorded_and_opened_runs_are_recent_until_they_are_gone(desk: Desk) -> 
     desk.tick_until_connected()
     desk.window.record.dispatch(Action.ARM)
     desk.play(END_S + 0.1)
-    assert desk.recent.runs == (RUN, "/recordings/a.h5")
+    assert desk.recent.runs == (RUN, str(Path("/recordings/a.h5").absolute()))
     desk.worker.calls[0].fail("there is no such run")
     assert desk.recent.runs == (RUN,)
 

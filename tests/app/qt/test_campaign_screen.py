@@ -1,6 +1,7 @@
 """The Campaign screen: Table 1 as it fills, the figure, and what leads on from there."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pyqtgraph as pg
@@ -10,13 +11,13 @@ from looking import clipped_words, visible_words
 from pointing import Hand
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QGuiApplication, QTextDocument, QTextDocumentFragment
-from PySide6.QtWidgets import QApplication, QMenu, QPushButton, QTableWidget
+from PySide6.QtWidgets import QApplication, QFileDialog, QMenu, QPushButton, QTableWidget
 from pytestqt.qtbot import QtBot
 from stage import Call, FakeWorker
 
 from app.presenters.base import Progress
 from app.presenters.campaign.presenter import CampaignPresenter
-from app.presenters.campaign.state import CampaignScope
+from app.presenters.campaign.state import CampaignScope, Product
 from app.qt.campaign.friction_plot import FrictionPlot
 from app.qt.campaign.screen import CampaignScreen
 from app.qt.theme import Theme
@@ -252,3 +253,20 @@ def test_rows_of_the_table_are_copied_with_uncertainties_in_columns_of_their_own
     assert cells["series"] == first.label == "1FFM0"
     assert (cells["f_d"], cells["u(f_d)"]) == (first.cells[7].value, first.cells[7].uncertainty[2:])
     assert float(cells["T, ms"]) > 0.0
+
+
+def test_a_table_is_proposed_by_one_suffix_and_follows_the_format(stage: Stage) -> None:
+    """Windows appends a filter's first suffix: `table-1.xlsx.csv` was written by one filter of all."""
+    stage.gathered()
+    stage.screen._ask_for_target(Product.TABLE)
+    dialog = stage.screen.findChild(QFileDialog)
+    assert dialog is not None
+
+    def proposed() -> tuple[str, str, str]:
+        return dialog.selectedNameFilter(), dialog.defaultSuffix(), Path(dialog.selectedFiles()[0]).name
+
+    assert proposed() == ("XLSX (*.xlsx)", "xlsx", "table-1.xlsx")
+    dialog.selectNameFilter("CSV (*.csv)")
+    dialog.filterSelected.emit("CSV (*.csv)")
+    assert proposed() == ("CSV (*.csv)", "csv", "table-1.csv")
+    dialog.close()

@@ -84,7 +84,7 @@ def test_the_folders_of_a_report_and_of_a_run_are_opened(
     stage.presenter.report.write("/tables/report.pdf")
     stage.reports.calls[-1].done("/tables/report.pdf")
     stage.button("Open folder").click()
-    assert opened == [str(Path(RUN).parent), "/tables"]
+    assert [Path(path) for path in opened] == [Path(RUN).parent, Path("/tables")]
 
 
 def test_samples_and_coefficients_of_the_run_are_exported(stage: Stage) -> None:

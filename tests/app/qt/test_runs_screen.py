@@ -9,7 +9,7 @@ import pytest
 from looking import clipped_words, plain, visible_words
 from msgspec.structs import replace
 from pointing import Hand
-from PySide6.QtCore import QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
+from PySide6.QtCore import QDir, QItemSelectionModel, QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QGuiApplication, QTextDocument
 from PySide6.QtWidgets import QApplication, QFileDialog, QLineEdit, QMessageBox, QPushButton
 from pytestqt.qtbot import QtBot
@@ -345,7 +345,10 @@ def test_faults_of_many_are_folded_away(stage: Stage) -> None:
     assert "b.h5: it is being recorded" in visible_words(stage.screen)
 
 
-def test_dropped_files_reach_the_presenter(stage: Stage) -> None:
+def test_dropped_files_reach_the_presenter_as_the_system_writes_them(
+    stage: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(QDir, "toNativeSeparators", lambda path: path.replace("/", "\\"))
     content = QMimeData()
     content.setUrls([QUrl.fromLocalFile("/elsewhere/x.h5")])
     drop = QDropEvent(
@@ -357,7 +360,7 @@ def test_dropped_files_reach_the_presenter(stage: Stage) -> None:
     )
     stage.screen.dropEvent(drop)
     (copy,) = stage.calls("change_runs")
-    assert [path.replace("\\", "/")[-14:] for path in copy.arguments[0]] == ["elsewhere/x.h5"]
+    assert [path[-14:] for path in copy.arguments[0]] == ["elsewhere\\x.h5"]
 
 
 def test_the_export_dialog_shows_what_will_be_written(stage: Stage) -> None:
@@ -402,7 +405,7 @@ def test_files_of_other_programs_are_chosen_and_open_the_import_dialog(stage: St
     dialog.filesSelected.emit(["/elsewhere/x.csv"])
     dialog.close()
     assert stage.imports == 1
-    assert stage.calls("survey_file")[-1].arguments[0] == "/elsewhere/x.csv"
+    assert Path(stage.calls("survey_file")[-1].arguments[0]) == Path("/elsewhere/x.csv")
 
 
 def decimated(name: str, start_s: float, end_s: float, spans: int) -> Trace:

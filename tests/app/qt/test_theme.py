@@ -1,6 +1,9 @@
 """Colours are distinguishable, the typeface is present, and the theme follows the system."""
 
 import itertools
+import os
+import subprocess
+import sys
 
 import pytest
 from PySide6.QtCore import Qt
@@ -108,3 +111,25 @@ def test_the_typeface_holds_where_the_system_gives_a_class_its_own(
             assert made.horizontalHeader().font().family() == FAMILY
     finally:
         qapp.setFont(before, kind.__name__)
+
+
+_WIDTHS = """
+from PySide6.QtGui import QFontMetricsF
+from PySide6.QtWidgets import QApplication
+from app.qt.theme import TextRole, Theme, font
+app = QApplication([])
+Theme(app)
+print([QFontMetricsF(font(role)).horizontalAdvance("Friction coefficient 0.123") for role in TextRole])
+"""
+
+
+def test_text_is_as_wide_without_a_configuration_of_fonts():
+    """Minimal systems have none: text of 11 px is 4 % wider there unless it is said otherwise."""
+
+    def widths(**variables: str) -> str:
+        return subprocess.run(
+            [sys.executable, "-c", _WIDTHS],
+            env=os.environ | variables, check=True, capture_output=True, text=True,
+        ).stdout  # fmt: skip
+
+    assert widths() == widths(FONTCONFIG_SYSROOT="/absent")
