@@ -4,12 +4,18 @@ import datetime
 import signal
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from app.runs import file_operations, listing, reader
 from app.runs.exchange import exporting
 from app.runs.validator import Validator, shared_validator
+
+if TYPE_CHECKING:
+    from PySide6.QtWidgets import QApplication
+
+    from app.qt.theme import Theme
 
 
 class KeptValidator:
@@ -57,6 +63,26 @@ def data_folder(tmp_path_factory, monkeypatch):
     place = tmp_path_factory.mktemp("data")
     monkeypatch.setenv("XDG_DATA_HOME", str(place))
     return place
+
+
+@pytest.fixture(scope="session")
+def only_theme(qapp: "QApplication") -> "Theme":
+    """The one theme of a process: a second one would set the colours of the first to its own."""
+    from PySide6.QtCore import Qt
+
+    from app.qt.theme import Theme
+
+    return Theme(qapp, Qt.ColorScheme.Light)
+
+
+@pytest.fixture
+def theme(only_theme: "Theme") -> "Iterator[Theme]":
+    """The theme, light again after the test."""
+    from PySide6.QtCore import Qt
+
+    yield only_theme
+    if only_theme._fixed is not Qt.ColorScheme.Light:
+        only_theme.fix(Qt.ColorScheme.Light)
 
 
 @pytest.fixture(scope="session")

@@ -23,7 +23,6 @@ from app.cli import output
 from app.presenters.base import Chip, Tone
 from app.presenters.runs.state import Overlay, Trace
 from app.qt.runs.preview import RunsPreview
-from app.qt.theme import Theme
 from app.qt.widgets.inputs import ask
 from app.qt.widgets.plots import PlotStack
 from app.qt.widgets.text import button_text, label, markup, plain_text, set_tool_tip, show_chip
@@ -190,11 +189,6 @@ def test_widgets_show_text_as_it_is(qtbot, poison):
     button = QPushButton(button_text(poison))
     qtbot.addWidget(button)
     assert button.shortcut().isEmpty()
-
-
-@pytest.fixture(scope="module")
-def theme(qapp):
-    return Theme(qapp, Qt.ColorScheme.Light)
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from multiprocessing import resource_tracker
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QCoreApplication, QEvent, Qt
+from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 from window_desk import Desk
@@ -30,12 +30,6 @@ def nothing_left_behind(qapp: QApplication) -> Iterator[None]:
     gone(lambda: [w for w in QApplication.topLevelWidgets() if id(w) not in widgets], "widgets")
     gone(lambda: [t for t in threading.enumerate() if t not in threads], "threads")
     gone(lambda: sorted(child_processes() - children), "processes")
-
-
-@pytest.fixture(scope="session")
-def theme(qapp: QApplication) -> Theme:
-    """The theme, light."""
-    return Theme(qapp, Qt.ColorScheme.Light)
 
 
 def gone(left: Callable[[], list[object]], what: str) -> None:
