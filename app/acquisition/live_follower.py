@@ -78,8 +78,12 @@ class RunFollower:
 
     def answer(self) -> LiveAnswer | None:
         """Identify the run; None without new rows, or when it was followed long enough."""
+        if (
+            self._next_row > self._last_row
+        ):  # to look at rows that are not taken costs as much as to take them
+            return None
         rows = self._ring.read_since(self._next_row)
-        if not len(rows) or rows.first_index > self._last_row:
+        if not len(rows):
             return None
         self._next_row = rows.end_index
         self._last_row = min(self._last_row, self._next_row + _FOLLOWED_S * self._ring.rate_hz)

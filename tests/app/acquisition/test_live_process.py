@@ -190,7 +190,7 @@ def test_without_room_for_a_process_the_run_goes_on(metadata):
     watch.stop()
 
 
-def test_a_run_by_the_clock_is_not_followed_for_hours(tmp_path, metadata):
+def test_a_run_by_the_clock_is_neither_followed_nor_read_for_hours(tmp_path, metadata, monkeypatch):
     with create_ring(tmp_path / "long.ring", 1 << 17, 1000.0, GAUGES) as ring, open_ring(ring.path) as reader:
         fill(ring)
         following = RunFollower(reader, FollowRun(str(ring.path), BEFORE, metadata, TIMED))
@@ -200,6 +200,7 @@ def test_a_run_by_the_clock_is_not_followed_for_hours(tmp_path, metadata):
         _rest(ring, 5_000)
         following.answer()
         _rest(ring, 5_000)
+        monkeypatch.setattr(reader, "read_since", lambda row: pytest.fail(f"rows from {row} on were read"))
         assert following.answer() is None
 
 
