@@ -78,9 +78,7 @@ class RunFollower:
 
     def answer(self) -> LiveAnswer | None:
         """Identify the run; None without new rows, or when it was followed long enough."""
-        if (
-            self._next_row > self._last_row
-        ):  # to look at rows that are not taken costs as much as to take them
+        if self._next_row > self._last_row:  # before reading, which costs as much as following
             return None
         rows = self._ring.read_since(self._next_row)
         if not len(rows):
