@@ -29,9 +29,10 @@ def writer():
 
 @pytest.fixture
 def no_thread_is_left():
-    """What feeds a journal or closes a run has ended by the end of its test."""
+    """What feeds a journal or closes a run has ended by the end of the test that began it."""
+    before = set(threading.enumerate())
     yield
-    for thread in threading.enumerate():
+    for thread in set(threading.enumerate()) - before:
         if thread.name in ("journal", "closing"):
             thread.join(PATIENCE_S)
             assert not thread.is_alive()
