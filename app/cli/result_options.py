@@ -7,8 +7,8 @@ from app.cli import shared_options as shared
 from app.cli.errors import CommandError, alternatives
 from app.cli.options import REQUIRED, argument, choice, completion, flag, number, option
 from app.cli.shared_options import JobOptions
+from app.reports.table.formats import FORMATS as TABLE_FORMATS
 
-TABLE_FORMATS = ("text", "csv", "json", "markdown", "latex", "xlsx")
 FIGURE_FORMATS = ("png", "svg", "pdf")
 FIGURES = ("2", "3a", "3b", "4a", "4b", "5a", "5b", "fd-velocity", "fd-position", "fd-time")
 """Those of the reports, which are not imported for `--help`."""

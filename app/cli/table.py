@@ -13,7 +13,8 @@ from app.cli import output as out
 from app.cli.campaigns import exit_with_failures, load_campaign
 from app.cli.errors import CommandError, alternatives
 from app.cli.result_options import TableOptions
-from app.reports.table.files import FORMAT_OF_ENDING, as_text, write_table
+from app.reports.table.files import as_text, write_table
+from app.reports.table.formats import FORMAT_OF_ENDING
 from app.reports.table.text import PublishedRowComparison, TableContent, note_sections
 from app.runs.campaign.origin import campaign_command
 from config.files import load_stand, published_table
@@ -57,9 +58,9 @@ def _format(name: str | None, output: Path | None, *, as_json: bool) -> str:
     if as_json:
         return "json"
     if name is None:
-        name = FORMAT_OF_ENDING.get(output.suffix.lower()) if output else "text"
+        name = FORMAT_OF_ENDING.get(output.suffix.lower()) if output and output.suffix else "text"
     if name is None:
-        endings = alternatives([ending for ending in FORMAT_OF_ENDING if ending])
+        endings = alternatives(list(FORMAT_OF_ENDING))
         raise CommandError(f"-o {output} has no known ending. Use {endings}, or give --format")
     if name == "xlsx" and output is None:
         raise CommandError("--format xlsx is a file. Say where it goes: -o TABLE.xlsx")

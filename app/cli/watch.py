@@ -17,6 +17,7 @@ from app.cli.errors import CommandError
 from app.cli.import_record import import_document, import_metadata, import_plan, import_summary
 from app.cli.run_file_options import WatchOptions
 from app.reports.table.files import write_table
+from app.reports.table.formats import FORMAT_OF_ENDING
 from app.reports.table.text import TableContent
 from app.reports.test_report.build import build_report
 from app.reports.test_report.head import read_head
@@ -38,9 +39,6 @@ from app.runs.validator import shared_validator
 from config.files import load_gauges, load_stand
 from config.schema import ConfigError
 
-_TABLE_FORMATS = {
-    ".txt": "text", ".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex", ".xlsx": "xlsx"
-}  # fmt: skip
 _PART = 1 << 20
 _REQUEST = AnalysisRequest(classical=False)
 
@@ -126,7 +124,7 @@ class FolderWatch:
         runs = collect_runs(self.analysed)
         if self.table:
             content = TableContent.of_runs(runs, campaign_command("table", self.analysed))
-            write_table(content, self.table, _TABLE_FORMATS[self.table.suffix.lower()], replace=True)
+            write_table(content, self.table, FORMAT_OF_ENDING[self.table.suffix.lower()], replace=True)
         if self.report and runs.runs:
             self._write_report(self.report, runs)
 
@@ -203,7 +201,7 @@ def _folder_watch(options: WatchOptions) -> FolderWatch:
         runs,
         import_plan(options.source),
         import_metadata(options),
-        table and out.output_file(table, force=True, endings=tuple(_TABLE_FORMATS), option="--write-table"),
+        table and out.output_file(table, force=True, endings=tuple(FORMAT_OF_ENDING), option="--write-table"),
         report and out.output_file(report, force=True, endings=(".pdf",), option="--write-report"),
     )
 

@@ -8,6 +8,7 @@ from app.presenters.campaign.state import CampaignScope, Product
 from app.presenters.campaign.tasks import collected_runs
 from app.reports.figures.figure_files import NUMBERS, FigureFolder, representative_runs, write_figures
 from app.reports.table.files import write_table
+from app.reports.table.formats import FORMAT_OF_ENDING
 from app.reports.table.text import TableContent
 from app.reports.test_report.build import build_report
 from app.reports.test_report.head import read_head
@@ -16,9 +17,6 @@ from app.runs.campaign.collect import CollectedRuns
 from app.runs.campaign.origin import campaign_command
 from messages.i18n import gettext, translate
 from messages.message import Message
-
-_TABLE_FORMATS = {".csv": "csv", ".json": "json", ".md": "markdown", ".tex": "latex", ".xlsx": "xlsx"}
-"""By suffix; text for others."""
 
 
 def write_product(
@@ -35,7 +33,7 @@ def write_product(
     command = "table" if product is Product.TABLE else "report"
     content = TableContent.of_runs(runs, _reproduce(command, scope, runs))
     if product is Product.TABLE:
-        name = _TABLE_FORMATS.get(target.suffix.lower(), "text")
+        name = FORMAT_OF_ENDING.get(target.suffix.lower(), "text")
         write_table(content, target, name, with_repeats=True, replace=True)
     else:
         head = read_head(datetime.datetime.now().astimezone().date())

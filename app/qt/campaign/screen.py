@@ -19,17 +19,18 @@ from app.qt.widgets.inputs import CheckBox, ProgressBar, ask_for_folder, connect
 from app.qt.widgets.layouts import STRETCH, clear, make_column, make_frame, make_row, make_scroll_area
 from app.qt.widgets.shortcuts import add_shortcut, bind_button
 from app.qt.widgets.text import ElidedLabel, break_path, label, set_tool_tip, show_chip
+from app.reports.table.formats import FORMAT_OF_ENDING
 from messages.i18n import N_, gettext, ngettext
 
 _COLUMN_WIDTH = 360
 _TABLE_SHARE, _FIGURE_SHARE = 3, 2
 _WORDS_WIDTH = 200
 _TARGETS: dict[Product, tuple[str, tuple[str, ...]]] = {
-    Product.TABLE: ("table-1", ("xlsx", "csv", "json", "md", "tex", "txt")),
+    Product.TABLE: ("table-1", tuple(FORMAT_OF_ENDING)),
     Product.FIGURES: ("", ()),
-    Product.REPORT: ("report", ("pdf",)),
+    Product.REPORT: ("report", (".pdf",)),
 }
-"""Proposed name and suffixes; a folder has none. Each has a filter: Windows appends its first suffix."""
+"""Proposed name and endings; a folder has none. Each has a filter: Windows appends its first ending."""
 
 
 class CampaignScreen(QWidget):
@@ -134,24 +135,24 @@ class CampaignScreen(QWidget):
         self._open_folder.show_folder(state.written_to)
 
     def _ask_for_target(self, product: Product) -> None:
-        name, suffixes = _TARGETS[product]
+        name, endings = _TARGETS[product]
         export = partial(self._presenter.export, product)
         folder = self._presenter.recent.export_folder or self._shown.folder
-        if not suffixes:
+        if not endings:
             ask_for_folder(self, gettext("Export"), folder, export)
             return
         dialog = QFileDialog(self, gettext("Export"), folder)
         dialog.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         dialog.setAcceptMode(QFileDialog.AcceptMode.AcceptSave)
-        filters = [f"{suffix.upper()} (*.{suffix})" for suffix in suffixes]
+        filters = [f"{ending[1:].upper()} (*{ending})" for ending in endings]
         dialog.setNameFilters(filters)
 
         def propose(chosen: str) -> None:
-            suffix = suffixes[filters.index(chosen)]
+            ending = endings[filters.index(chosen)]
             typed = [Path(path) for path in dialog.selectedFiles()]
             stem = typed[0].stem if typed and typed[0].suffix else name
-            dialog.setDefaultSuffix(suffix)
-            dialog.selectFile(f"{stem}.{suffix}")
+            dialog.setDefaultSuffix(ending)
+            dialog.selectFile(f"{stem}{ending}")
 
         propose(filters[0])
         dialog.filterSelected.connect(propose)

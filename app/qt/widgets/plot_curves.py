@@ -61,7 +61,7 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def show_polyline(self, line: Polyline) -> None:
         """Draw a line; one of lowest and highest values as a band, where strokes could not be told apart."""
-        is_dense = self._strokes(line) > _DENSE_STROKES
+        is_dense = self._is_dense(line)
         self._polyline, self._is_band = line, is_dense and line.is_min_max
         if self._is_band:
             self._band.show_line(line)
@@ -80,13 +80,12 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
             painter.setPen(self.opts["pen"])
             painter.drawPath(pg.arrayToQPath(self._polyline.time_s, self._polyline.value, connect="finite"))
 
-    def _strokes(self, line: Polyline) -> float:
-        """Length of a line in heights of the plot."""
+    def _is_dense(self, line: Polyline) -> bool:
         view = self.getViewBox()
         if view is None:
-            return 0.0
+            return False
         _, (low, high) = view.viewRange()
-        return line.strokes(high - low)
+        return line.strokes(high - low) > _DENSE_STROKES
 
 
 class Line(Curve):
@@ -131,9 +130,7 @@ class Line(Curve):
             return
         line = self._line.thinned(*part, pixels)
         self.show_polyline(
-            _edges(self._line.part(*part, pixels // _EDGE_PX))
-            if self._strokes(line) > _DENSE_STROKES
-            else line
+            _edges(self._line.part(*part, pixels // _EDGE_PX)) if self._is_dense(line) else line
         )
 
 

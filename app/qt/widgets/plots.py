@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pyqtgraph as pg
 from numpy.typing import NDArray
-from PySide6.QtCore import QEvent, QPointF, QRect, QRectF, QSizeF, Qt, Signal
+from PySide6.QtCore import QEvent, QPointF, QRect, Qt, Signal
 from PySide6.QtGui import (
     QContextMenuEvent,
     QEnterEvent,
@@ -17,7 +17,7 @@ from PySide6.QtGui import (
     QPixmapCache,
     QResizeEvent,
 )
-from PySide6.QtWidgets import QFrame, QGraphicsItem, QGraphicsScene, QWidget
+from PySide6.QtWidgets import QFrame, QGraphicsItem, QWidget
 
 from analysis.formatting import typeset, with_unit
 from app.presenters.curve_table import TableCurve
@@ -37,12 +37,6 @@ _ENDLESS = 16_777_215.0
 """Qt's own largest height."""
 _CACHE_KB = 128 * 1024
 """Room for the pictures of axes and grids of a large screen; Qt's own 10 MB hold those of a small one."""
-
-_CENTRED = Qt.AlignmentFlag.AlignCenter
-_BESIDE = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
-_BELOW = Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop
-_TEXT_HEIGHT = 0.8
-"""Of what Qt says of a line of text: without the room between lines, as in pyqtgraph."""
 
 
 class Plot:
@@ -171,8 +165,6 @@ class PlotStack(QFrame):
         self.table: Callable[[], list[TableCurve]] = self.curves_in_view
         """What is saved as a table."""
         self._canvas = pg.GraphicsLayoutWidget()
-        # With each step of a zoom all items move: to file them anew takes longer than to look at all of them.
-        self._canvas.scene().setItemIndexMethod(QGraphicsScene.ItemIndexMethod.NoIndex)
         for part in (self._canvas, self._canvas.viewport()):
             part.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are for the whole plot
         self.plots = [Plot(self._canvas, row) for row in range(len(titles))]
@@ -353,81 +345,39 @@ class _Axis(pg.AxisItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def ticks_in_view(self, level: int) -> list[float]:
         """Ticks of a level: those with a number, then those between them."""
+        if self._tickLevels is not None:
+            return [value for value, _ in self._tickLevels[level]] if level < len(self._tickLevels) else []
         view = self.linkedView()
         length = view.height() if self.orientation == "left" else view.width()
-        levels = self._levels(length) if length else []
-        return [value for value, _ in levels[level]] if level < len(levels) else []
-
-    def _levels(self, length_px: float) -> Any:
-        """Ticks of each level with their texts."""
-        if self._tickLevels is not None:
-            return self._tickLevels
-        asked = (*self.range, length_px, self.scale)
-        if asked != self._known[0]:
-            self._known = (
-                asked,
-                [
-                    list(zip(values, self.tickStrings(values, self.scale, spacing), strict=True))
-                    for spacing, values in self.tickValues(self.range[0], self.range[1], length_px)
-                ],
-            )
-        return self._known[1]
+        levels: Any = self.tickValues(self.range[0], self.range[1], length) if length else []
+        return levels[level][1] if level < len(levels) else []
 
     def generateDrawSpecs(self, painter: Any) -> Any:  # noqa: N802
-        """Line and texts: of the second level only where there is room for them, as pyqtgraph has it.
-
-        It is told of no ticks, which have no length. pyqtgraph itself takes three times as long: it measures
-        all texts, and prepares ticks and their pens.
-        """
-        bounds = self.mapRectFromParent(self.geometry())
-        is_left = self.orientation == "left"
-        ends = (bounds.topRight(), bounds.bottomRight()) if is_left else (bounds.topLeft(), bounds.topRight())
-        line = (self.pen(), *ends)
-        low, high = self.range
-        length = bounds.height() if is_left else bounds.width()
-        if not self.style["showValues"] or low == high or length <= 0.0:
-            return line, [], []
-        painter.setFont(self.style["tickFont"])
-        room, largest = self.boundingRect(), QSizeF()
-        texts: list[tuple[QRectF, Any, str]] = []
-        gap = self.style["tickTextOffset"][0 if is_left else 1]
-        flags = Qt.TextFlag.TextDontClip | (_BESIDE if is_left else _BELOW)
-        for ticks in self._levels(length):
-            along = largest.height() if is_left else largest.width()
-            if texts and self._is_crowded(len(texts), along * (len(texts) + len(ticks)) / length):
-                break
-            for value, text in ticks:
-                size = painter.boundingRect(QRectF(0.0, 0.0, 100.0, 100.0), _CENTRED, text).size()
-                size.setHeight(_TEXT_HEIGHT * size.height())
-                largest = largest.expandedTo(size)
-                share = (value - low) / (high - low)
-                if is_left:
-                    place = QRectF(QPointF(bounds.right() - gap - size.width(), 0.0), size)
-                    place.moveTop(bounds.bottom() - share * length - size.height() / 2.0)
-                else:
-                    place = QRectF(QPointF(0.0, bounds.top() + gap), size)
-                    place.moveLeft(bounds.left() + share * length - size.width() / 2.0)
-                if room.contains(place):
-                    texts.append((place, flags, text))
-        self._updateMaxTextSize(largest.width() if is_left else largest.height())
-        return line, [], texts
-
-    def _is_crowded(self, texts: int, fill: float) -> bool:
-        """Whether more than so many texts would fill too large a share of the axis."""
-        return any(texts >= count and fill >= limit for count, limit in self.style["textFillLimits"])
+        """As pyqtgraph, without ticks, which have no length; of an axis without numbers only its line."""
+        if not self.style["showValues"]:
+            bounds = self.mapRectFromParent(self.geometry())
+            return (self.pen(), bounds.topLeft(), bounds.topRight()), [], []
+        specs = super().generateDrawSpecs(painter)
+        return None if specs is None else (specs[0], [], specs[2])
 
     def tickValues(self, minVal: float, maxVal: float, size: float) -> Any:  # noqa: N802
         """Interval and ticks of each level, without those of the levels before, as pyqtgraph counts them.
 
-        Its own arithmetic with arrays takes ten times as long for so few.
+        Its own arithmetic with arrays takes ten times as long for so few; it asks several times for the same.
         """
-        low, high = sorted((minVal * self.scale, maxVal * self.scale))
-        levels: list[tuple[float, list[float]]] = []
-        for spacing, _ in self.tickSpacing(low, high, size):
-            ticks = [n * spacing for n in range(math.ceil(low / spacing), math.floor(high / spacing) + 1)]
-            coarser = [interval for interval, _ in levels]
-            levels.append((spacing, [tick for tick in ticks if not _is_multiple(tick, spacing, coarser)]))
-        return [(spacing / self.scale, [tick / self.scale for tick in ticks]) for spacing, ticks in levels]
+        asked = (minVal, maxVal, size, self.scale)
+        if asked != self._known[0]:
+            low, high = sorted((minVal * self.scale, maxVal * self.scale))
+            levels: list[tuple[float, list[float]]] = []
+            for spacing, _ in self.tickSpacing(low, high, size):
+                ticks = [n * spacing for n in range(math.ceil(low / spacing), math.floor(high / spacing) + 1)]
+                coarser = [interval for interval, _ in levels]
+                levels.append((spacing, [tick for tick in ticks if not _is_multiple(tick, spacing, coarser)]))
+            self._known = (
+                asked,
+                [(spacing / self.scale, [tick / self.scale for tick in ticks]) for spacing, ticks in levels],
+            )
+        return self._known[1]
 
     def tickStrings(self, values: Any, scale: float, spacing: float) -> list[str]:  # noqa: N802
         return [typeset(text) for text in super().tickStrings(values, scale, spacing)]

@@ -28,22 +28,11 @@ from app.runs.campaign.documents import effect_documents, pooled_document
 from app.runs.disk import atomic_write
 from app.runs.exchange.export_formats import Sheet, csv_cell, escape_latex, write_sheets
 
-TEXTS: Final = ("text", "csv", "json", "markdown", "latex")
-FORMATS: Final = (*TEXTS, "xlsx")
-FORMAT_OF_ENDING: Final = {
-    "": "text",
-    ".txt": "text",
-    ".csv": "csv",
-    ".json": "json",
-    ".md": "markdown",
-    ".tex": "latex",
-    ".xlsx": "xlsx",
-}
 _UNLIMITED_WIDTH: Final = 1_000_000  # of a text that is not printed on a terminal
 
 
 def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool = False) -> str:
-    """The table in one of `TEXTS`; `width` is that of the terminal."""
+    """The table in one of `formats.TEXTS`; `width` is that of the terminal."""
     if name == "csv":
         header, rows = flat_table(content)
         file = io.StringIO()
@@ -63,7 +52,7 @@ def as_text(content: TableContent, name: str, width: int, *, with_repeats: bool 
 def write_table(
     content: TableContent, path: Path, name: str, *, with_repeats: bool = False, replace: bool = False
 ) -> None:
-    """Write the table in one of `FORMATS`. Raises as `write_workbook`."""
+    """Write the table in one of `formats.FORMATS`. Raises as `write_workbook`."""
     if name == "xlsx":
         write_workbook(content, path, replace=replace)
     else:

@@ -10,10 +10,9 @@ from typing import Any
 import pytest
 from cli_kit import assert_one_error_line
 
-from app.cli.result_options import FIGURE_FORMATS, FIGURES, TABLE_FORMATS
+from app.cli.result_options import FIGURE_FORMATS, FIGURES
 from app.reports.figures import style
 from app.reports.figures.plate_figures import ALL_FIGURES
-from app.reports.table import files
 
 LISTS = ((), ("calibrate",), ("device",))
 COMMANDS = (
@@ -171,7 +170,7 @@ def test_help_imports_only_the_options() -> None:
 
 
 def test_formats_are_those_of_the_reports() -> None:
-    assert (TABLE_FORMATS, FIGURE_FORMATS) == (files.FORMATS, style.FORMATS)
+    assert FIGURE_FORMATS == style.FORMATS
 
 
 REFERENCE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "commands.md"
