@@ -1,9 +1,9 @@
 """Many runs: `python benchmarks/campaign.py` prints the tables of docs/benchmarks.md.
 
 Runs a second of one process that has loaded the analysis, of two that load it, and of a Dask cluster of two
-workers on loopback, each from its start to its end; the command with one and two processes; what a second pass
-takes, which finds everything up to date; memory over thousands of runs, by copies of short ones; and a campaign
-of 108 runs from files to the PDF of its report.
+workers on loopback, each from its start to its end; the command with one and two processes; what a second
+pass takes, which finds everything up to date; memory over thousands of runs, by copies of short ones; and a
+campaign of 108 runs from files to the PDF of its report.
 """
 
 import argparse
