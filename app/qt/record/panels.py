@@ -1,10 +1,11 @@
 """Panels of the right column: guidance while recording, result and decision after a run."""
 
+import math
 from collections.abc import Callable
 
 from PySide6.QtCore import QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent
-from PySide6.QtWidgets import QFrame, QLabel, QPushButton, QSizePolicy, QWidget
+from PySide6.QtGui import QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QFrame, QGridLayout, QLabel, QPushButton, QSizePolicy, QWidget
 
 from analysis.catalogue import MILLIMETRE, displacement_unit
 from app.presenters.base import Chip, Progress, Tone
@@ -31,6 +32,8 @@ _ESTIMATES_MAX = 3
 _RESULT_ROWS_MAX = 4
 _WARNINGS_MAX = 6
 _BAR_HEIGHT = 40
+_DONE_MARK = "✓"
+_STEP_SPACING = 4
 _BAR_RADIUS = 6.0
 
 
@@ -121,27 +124,54 @@ def _reserve_height(target: QLabel, lines_min: int) -> None:
 
 
 class Stepper(QWidget):
+    """Steps of a test in a row, or in two where a row has no room for all of them with their marks."""
+
     def __init__(self) -> None:
         super().__init__()
         self._labels: list[QLabel] = []
-        self._layout = make_row(spacing=4, of=self)
+        self._names: tuple[str, ...] = ()
+        self._columns = 0
+        self._layout = QGridLayout(self)
+        self._layout.setContentsMargins(0, 0, 0, 0)
+        self._layout.setHorizontalSpacing(_STEP_SPACING)
+        self._layout.setVerticalSpacing(0)
 
     def show_steps(self, steps: tuple[record.Step, ...]) -> None:
         while len(self._labels) < len(steps):
             self._add_label()
         for target, step in zip(self._labels, steps, strict=True):
-            mark = "✓" if step.status is StepStatus.DONE else ""
-            target.setText(f"{mark}{step.name}")
+            target.setText(f"{_DONE_MARK if step.status is StepStatus.DONE else ''}{step.name}")
             set_property(target, "step", step.status.value)
+        self._names = tuple(step.name for step in steps)
+        self._arrange()
         now = next((step.name for step in steps if step.status is StepStatus.NOW), gettext("none"))
         self.setAccessibleName(gettext("Step: {name}", name=now))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        super().resizeEvent(event)
+        self._arrange()
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        return QSize(0, super().minimumSizeHint().height())
 
     def _add_label(self) -> None:
         made = label(role=TextRole.LABEL)
         made.setAlignment(Qt.AlignmentFlag.AlignCenter)
         made.setMinimumHeight(24)
         self._labels.append(made)
-        self._layout.addWidget(made, 1)
+
+    def _arrange(self) -> None:
+        width = sum(
+            target.fontMetrics().horizontalAdvance(_DONE_MARK + name) + _STEP_SPACING
+            for target, name in zip(self._labels, self._names, strict=True)
+        )
+        columns = len(self._names) if width <= self.width() else math.ceil(len(self._names) / 2)
+        if columns == self._columns:
+            return
+        self._columns = columns
+        for place, target in enumerate(self._labels):
+            self._layout.addWidget(target, *divmod(place, columns))
+            self._layout.setColumnStretch(place, int(place < columns))
 
 
 class TargetBar(QWidget):

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPushButton
 from pytestqt.qtbot import QtBot
 from stage import (
     END_S,
@@ -38,6 +38,8 @@ from app.presenters.record.state import (
     RecordTask,
     RunForm,
     SavePlan,
+    Step,
+    StepStatus,
     TaskDone,
 )
 from app.qt.keyboard import KeyboardWindow
@@ -297,6 +299,23 @@ def test_the_target_bar_stays_where_it_is_while_the_table_is_pulled_and_held(sta
         assert bar.isVisible()
         places.append((bar.mapTo(stage.screen, bar.rect().topLeft()), steps.y()))
     assert len(set(places)) == 1, places
+
+
+@pytest.mark.parametrize(("width", "rows"), [(330, 2), (700, 1)])
+def test_steps_take_two_rows_where_one_has_no_room_for_them(qtbot: QtBot, width: int, rows: int) -> None:
+    names = ("Nol", "Tortish", "Tutish", "Tayyor", "Sirpanish", "Tebranish", "Saqlash", "Natija")
+    stepper = Stepper()
+    qtbot.addWidget(stepper)
+    stepper.show_steps(tuple(Step(name, StepStatus.AHEAD) for name in names))
+    stepper.resize(width, 60)
+    stepper.show()
+    QApplication.processEvents()
+    stepper.show_steps(tuple(Step(name, StepStatus.DONE) for name in names))
+    QApplication.processEvents()
+    shown = stepper.findChildren(QLabel)
+    assert len({one.y() for one in shown}) == rows
+    assert all(one.width() >= one.sizeHint().width() for one in shown)
+    assert max(one.geometry().right() for one in shown) < width
 
 
 def test_t_tares_and_shift_t_goes_back(stage: Stage) -> None:
