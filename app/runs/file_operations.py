@@ -14,8 +14,9 @@ import h5py
 import numpy as np
 
 from app.runs import errors, schema
-from app.runs.columns import sample_paths, stored_rows
-from app.runs.disk import atomic_write, make_folder, storage_error
+from app.runs.blocks import StoredRun
+from app.runs.columns import check_samples, sample_paths, stored_rows
+from app.runs.disk import atomic_write, make_folder, storage_error, sync_file
 from app.runs.listing import check_folder_exists, find_run_files
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.metadata import EndMetadata
@@ -133,6 +134,23 @@ def inspect_run(path: Path) -> ExistingRun | None:
         return read_file(path, inspect)
     except errors.RunError:
         return None
+
+
+def finished_run(path: Path, samples: int) -> StoredRun | None:
+    """A run of so many samples that a writer finished which gave no answer, once it is sound and on disk.
+
+    The writer may have stood still before it read the file again and synced it. None where it has not finished.
+    """
+    run = inspect_run(path)
+    if run is None or run.end is None or run.samples != samples:
+        return None
+    try:
+        read_file(path, check_samples)
+        sync_file(path)
+        sync_folder(path.parent)
+    except (errors.RunError, OSError):
+        return None
+    return StoredRun(str(path), samples, run.raw_bytes_stored)
 
 
 def contains_all_samples(rebuilt: Path, other: Path) -> bool:

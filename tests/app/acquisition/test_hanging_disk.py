@@ -13,6 +13,7 @@ from app.acquisition.errors import JournalError
 from app.acquisition.journal.file import create_journal_file
 from app.acquisition.journal.journal import Journal
 from app.acquisition.messages import EndReason, RunSettings, StateChanged
+from app.runs import file_operations
 from app.runs.blocks import RunBlock
 from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
@@ -162,6 +163,26 @@ def test_a_run_that_a_stopped_writer_had_finished_is_no_fault(tmp_path, monkeypa
     assert ended.samples > 0
     assert writer.given_up, "the next run has another writer"
     assert ("gives no answer" in str(ended.message)) is not has_finished
+
+
+def test_a_disk_that_hangs_when_a_finished_run_is_looked_for_does_not_hold_the_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_file, "_CLOSING_S", 0.2)
+    monkeypatch.setattr(run_file, "_INSPECTION_S", 0.2)
+    is_there, looked = threading.Event(), threading.Event()
+
+    def hang(*_):
+        is_there.wait(60.0)
+        looked.set()
+
+    monkeypatch.setattr(file_operations, "sync_file", hang)
+    run = RunSettings(str(tmp_path), series="1FFM0", trigger="none", duration_s=0.4)
+    bench = Bench(tmp_path, run, writer=StoppedWriter(tmp_path / "run.h5", has_finished=True))
+    bench.play(400)
+    ended = bench.ended()
+    is_there.set()
+    assert ended.ended is EndReason.WRITE_ERROR
+    assert bench.journal.path.exists()
+    assert looked.wait(10.0)
 
 
 def test_arming_waits_for_no_disk_that_hangs(tmp_path):
