@@ -139,7 +139,7 @@ def inspect_run(path: Path) -> ExistingRun | None:
 def finished_run(path: Path, samples: int) -> StoredRun | None:
     """A run of so many samples that a writer finished which gave no answer, once it is sound and on disk.
 
-    The writer may have stood still before it read the file again and synced it. None where it has not finished.
+    The writer may have been stopped before it read the file again and synced it. None for any other.
     """
     run = inspect_run(path)
     if run is None or run.end is None or run.samples != samples:
