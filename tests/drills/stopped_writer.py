@@ -2,13 +2,14 @@
 
 A way of `tests.drills.starved`. The engine waits 120 s for its answer. A run that the writer had finished is
 told as any other, without a journal beside it. Of one that it had not finished, all samples are in the
-journal, and rebuilt. Half of the moments lie where the file has its last size and is not yet synced, the
-others from 0.3 s before the end of the run to 0.3 s after.
+journal, and rebuilt. Half of the moments lie where the file is closed and not yet read again and synced,
+the others from 0.3 s before the end of the run to 0.3 s after.
 """
 
 import os
 import random
 import signal
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
@@ -43,7 +44,9 @@ from tests.drills.unplug import wait_for
 STOPPED_S = 130.0
 ANSWER_S = 60.0
 """An end that came sooner is the answer of the writer; without it the engine waits for 120 s."""
-_AT_ONCE = 4
+_AT_ONCE = 8
+_AIMING = threading.Lock()
+"""Held from the start of a run to the stop of its writer, whose moment lasts a few milliseconds."""
 _DURATION_S = 3.0
 _PATIENCE_S = 220.0
 
@@ -109,17 +112,18 @@ def _one_run(place: Path, moments: random.Random, report: StoppedWriterReport) -
 
 def _stop_at_end(engine: EngineClient, place: Path, moments: random.Random) -> StoppedRun:
     wait_for(engine, Connected)
-    engine.send(Arm(RunSettings(str(place), series="1FFM0", trigger="none", duration_s=_DURATION_S)))
-    started = wait_for(engine, RunStarted)
-    assert isinstance(started, RunStarted)
-    path = Path(started.path)
-    writer = next(one for one in descendants_of(engine.process_id) if is_a(one, "writer"))
-    if moments.random() < 0.5:
-        _await_last_size(path)
-    else:
-        time.sleep(_DURATION_S + moments.uniform(-0.3, 0.3))
-    os.kill(writer, signal.SIGSTOP)
-    stopped_at_s = time.perf_counter()
+    with _AIMING:
+        engine.send(Arm(RunSettings(str(place), series="1FFM0", trigger="none", duration_s=_DURATION_S)))
+        started = wait_for(engine, RunStarted)
+        assert isinstance(started, RunStarted)
+        path = Path(started.path)
+        writer = next(one for one in descendants_of(engine.process_id) if is_a(one, "writer"))
+        if moments.random() < 0.5:
+            _await_closed_file(writer, path)
+        else:
+            time.sleep(_DURATION_S + moments.uniform(-0.3, 0.3))
+        os.kill(writer, signal.SIGSTOP)
+        stopped_at_s = time.perf_counter()
     try:
         ended = _await_end(engine)
         ended_s = time.perf_counter() - stopped_at_s
@@ -130,13 +134,20 @@ def _stop_at_end(engine: EngineClient, place: Path, moments: random.Random) -> S
     return StoppedRun(ended, ended_s, left is not None and left.end is not None)
 
 
-def _await_last_size(path: Path) -> None:
-    """Wait until a file gets smaller: its writer gives back what it had reserved when the run is complete."""
-    largest, deadline_s = 0, time.perf_counter() + 60.0
-    while (size := path.stat().st_size) >= largest:
-        largest = size
+def _await_closed_file(writer: int, path: Path) -> None:
+    """Wait until a writer has closed its run file, which it then reads again and syncs."""
+    links = [link for link in Path(f"/proc/{writer}/fd").iterdir() if _target(link) == str(path)]
+    deadline_s = time.perf_counter() + 60.0
+    while any(_target(link) == str(path) for link in links):
         if time.perf_counter() > deadline_s:
-            raise TimeoutError("the run file does not get its last size within 60 s")
+            raise TimeoutError("the writer does not close the run file within 60 s")
+
+
+def _target(link: Path) -> str:
+    try:
+        return os.readlink(link)  # noqa: PTH115
+    except OSError:  # closed
+        return ""
 
 
 def _await_end(engine: EngineClient) -> RunEnded:
