@@ -20,6 +20,7 @@ from app.acquisition.messages import EndReason
 from app.acquisition.stream.live_stream import DecodedRead
 from app.runs.blocks import CalibratedBlock, RunBlock, StoredRun, count_flags
 from app.runs.errors import DiskFullError, RunError, WriteError
+from app.runs.lock import remove_lock
 from app.runs.metadata import EndMetadata
 from app.runs.writer_client import OpenRun, WriterClient
 from drivers.host_time import host_ns
@@ -220,6 +221,8 @@ class RunFile:
             error = WriteError(template, timeout_s=timeout_s)
             self._writer.give_up(error)
             if (stored := self._finished_run()) is not None:
+                self._writer.kill()
+                remove_lock(Path(stored.path))
                 return stored
             raise error from None
 

@@ -116,8 +116,11 @@ class ExistingRun:
     raw_bytes_stored: bool
 
 
-def inspect_run(path: Path) -> ExistingRun | None:
-    """Inspect a run file that may be damaged; None where it cannot be read or does not exist."""
+def inspect_run(path: Path, *, locked: bool = False) -> ExistingRun | None:
+    """Inspect a run file that may be damaged; None where it cannot be read or does not exist.
+
+    With `locked` the process that holds the lock of the run is known to do nothing any more.
+    """
 
     def inspect(file: h5py.File) -> ExistingRun:
         additions = bool(len(file[schema.HISTORY])) or any(
@@ -129,7 +132,8 @@ def inspect_run(path: Path) -> ExistingRun | None:
         )
 
     try:
-        check_openable(path)
+        if not locked:
+            check_openable(path)
         shared_validator().validate(path)
         return read_file(path, inspect)
     except errors.RunError:
@@ -139,9 +143,9 @@ def inspect_run(path: Path) -> ExistingRun | None:
 def finished_run(path: Path, samples: int) -> StoredRun | None:
     """A run of so many samples that a writer finished which gave no answer, once it is sound and on disk.
 
-    The writer may have been stopped before it read the file again and synced it. None for any other.
+    The writer holds its lock still, and may not have read the file again and synced it. None for any other.
     """
-    run = inspect_run(path)
+    run = inspect_run(path, locked=True)
     if run is None or run.end is None or run.samples != samples:
         return None
     try:

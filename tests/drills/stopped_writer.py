@@ -6,6 +6,7 @@ journal, and rebuilt. Half of the moments lie where the file is closed and not y
 the others from 0.3 s before the end of the run to 0.3 s after.
 """
 
+import contextlib
 import os
 import random
 import signal
@@ -127,10 +128,11 @@ def _stop_at_end(engine: EngineClient, place: Path, moments: random.Random) -> S
     try:
         ended = _await_end(engine)
         ended_s = time.perf_counter() - stopped_at_s
-        left = inspect_run(path)
+        left = inspect_run(path, locked=True)
         time.sleep(max(0.0, STOPPED_S - (time.perf_counter() - stopped_at_s)))
     finally:
-        os.kill(writer, signal.SIGCONT)
+        with contextlib.suppress(ProcessLookupError):  # the engine ends one that has finished
+            os.kill(writer, signal.SIGCONT)
     return StoppedRun(ended, ended_s, left is not None and left.end is not None)
 
 
