@@ -6,6 +6,7 @@ import logging
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
@@ -23,6 +24,7 @@ from drivers.host_time import host_ns
 _log = logging.getLogger(__name__)
 
 _PIECE_BYTES = 1 << 20
+_REPEATED_BYTES = 4096  # more than a frame of any device
 _ROOM_BYTES = 32 << 20
 """Least free space of a fallback folder beyond what is copied: with less it would be full as soon."""
 
@@ -52,7 +54,7 @@ class JournalFile:
     When the disk is full, the network share gone, or the folder read-only, all that was written moves to the
     first of the fallback folders that takes it, and the rest is appended there. What can no longer be read
     stays where it is; the new file then begins with `first`, the magic and the record that identifies the
-    run, and tells how many reads stay there.
+    run, tells how many reads stay there, and repeats the last of them, since a frame may lie across two.
     """
 
     def __init__(
@@ -64,6 +66,7 @@ class JournalFile:
         self._first = first
         self.size = len(first)  # bytes of all whole records
         self._reads = 0  # of the run, in this file and in those that it continues
+        self._recent: deque[bytes] = deque()  # the last of them, as records
         self._lock = lock
         self._fallback_folders = list(fallback_folders)
         self._sync: FileSync | None = None
@@ -73,7 +76,7 @@ class JournalFile:
     def successor(self) -> "JournalFile":
         """A journal of the same run that begins in a fallback folder; the first `append` makes its file."""
         made = JournalFile(self.path, self._file, self._first, self._lock, self._fallback_folders)
-        made._is_made, made._reads = False, self._reads
+        made._is_made, made._reads, made._recent = False, self._reads, self._recent.copy()
         return made
 
     @property
@@ -93,7 +96,8 @@ class JournalFile:
                 self._move(error)
             else:
                 self.size += len(record)
-                self._reads += is_read(record)
+                if is_read(record):
+                    self._remember(record)
                 return
 
     def begin_sync(self) -> None:
@@ -146,10 +150,17 @@ class JournalFile:
                 return
         raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
 
+    def _remember(self, record: bytes) -> None:
+        self._reads += 1
+        self._recent.append(record)
+        while sum(map(len, self._recent)) - len(self._recent[0]) >= _REPEATED_BYTES:
+            self._recent.popleft()
+
     def _begin_in(self, file: IO[bytes]) -> None:
         """Begin a file that continues one which cannot be read."""
-        continued = msgspec.json.encode(Continued(self._reads))
+        continued = msgspec.json.encode(Continued(self._reads - len(self._recent)))
         beginning = self._first + encode_record(continued, host_ns(), RecordKind.NOTE)
+        beginning += b"".join(self._recent)
         _write_all(file, beginning)
         self.size = len(beginning)
 

@@ -29,7 +29,7 @@ class JournalHeader(msgspec.Struct, frozen=True, tag=True):
 
 
 class Continued(msgspec.Struct, frozen=True, tag=True):
-    """The journal begins behind so many reads of its run, which stay on a disk that hangs or is gone."""
+    """The journal begins after so many reads of its run, which stay on a disk that hangs or is gone."""
 
     reads: int
 
