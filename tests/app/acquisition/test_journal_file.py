@@ -9,8 +9,8 @@ from disk_kit import FailingFile
 
 from app.acquisition.errors import JournalFullError
 from app.acquisition.journal.file import JournalFile, create_journal_file
-from app.acquisition.journal.records import Continued, decode_metadata_record
 from app.acquisition.journal.journal import Journal
+from app.acquisition.journal.records import Continued, decode_metadata_record
 from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
 
