@@ -20,6 +20,7 @@ from app.acquisition.messages import EndReason
 from app.acquisition.stream.live_stream import DecodedRead
 from app.runs.blocks import CalibratedBlock, RunBlock, StoredRun, count_flags
 from app.runs.errors import DiskFullError, RunError, WriteError
+from app.runs.lock import remove_lock
 from app.runs.metadata import EndMetadata
 from app.runs.writer_client import OpenRun, WriterClient
 from drivers.host_time import host_ns
@@ -85,6 +86,7 @@ class UncommittedRows:
 
 _BATCH_S = 0.05  # rows are passed to the writer in batches: block by block costs several times as much
 _CLOSING_S = 120.0
+_INSPECTION_S = 30.0  # for the run of a writer that gave no answer: its disk may hang
 _HANGING_S = 3.0  # for a writer whose disk is known to hang
 _SLOW_BYTES_PER_S = 5e6  # and so much longer for what the writer copies and reads again, on a slow disk
 
@@ -219,19 +221,28 @@ class RunFile:
             error = WriteError(template, timeout_s=timeout_s)
             self._writer.give_up(error)
             if (stored := self._finished_run()) is not None:
+                self._writer.kill()
+                remove_lock(Path(stored.path))
                 return stored
             raise error from None
 
     def _finished_run(self) -> StoredRun | None:
         """What a writer that gives no answer has finished; None where it has not, or its disk hangs too."""
-        from app.runs.file_operations import inspect_run  # loads HDF5, which an engine does without
-
         path, samples = self._known_path(), self.statistics.losses().samples
         if not path or self._journal.left is not None:
             return None
-        run = inspect_run(Path(path))
-        is_finished = run is not None and run.end is not None and run.samples == samples
-        return StoredRun(path, samples, run.raw_bytes_stored) if run and is_finished else None
+        found: Future[StoredRun | None] = Future()
+
+        def find() -> None:
+            from app.runs.file_operations import finished_run  # loads HDF5, which an engine does without
+
+            found.set_result(finished_run(Path(path), samples))
+
+        threading.Thread(target=find, name="looking for a finished run", daemon=True).start()
+        try:
+            return found.result(_INSPECTION_S)
+        except FutureTimeoutError:
+            return None
 
     def _remedy(self, journal_fault: Exception | None) -> Message:
         left = self._journal.left

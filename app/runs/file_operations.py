@@ -14,8 +14,9 @@ import h5py
 import numpy as np
 
 from app.runs import errors, schema
-from app.runs.columns import sample_paths, stored_rows
-from app.runs.disk import atomic_write, make_folder, storage_error
+from app.runs.blocks import StoredRun
+from app.runs.columns import check_samples, sample_paths, stored_rows
+from app.runs.disk import atomic_write, make_folder, storage_error, sync_file
 from app.runs.listing import check_folder_exists, find_run_files
 from app.runs.lock import LockHeldError, is_being_recorded, recording_lock
 from app.runs.metadata import EndMetadata
@@ -115,8 +116,11 @@ class ExistingRun:
     raw_bytes_stored: bool
 
 
-def inspect_run(path: Path) -> ExistingRun | None:
-    """Inspect a run file that may be damaged; None where it cannot be read or does not exist."""
+def inspect_run(path: Path, *, locked: bool = False) -> ExistingRun | None:
+    """Inspect a run file that may be damaged; None where it cannot be read or does not exist.
+
+    With `locked` the process that holds the lock of the run is known to do nothing any more.
+    """
 
     def inspect(file: h5py.File) -> ExistingRun:
         additions = bool(len(file[schema.HISTORY])) or any(
@@ -128,11 +132,29 @@ def inspect_run(path: Path) -> ExistingRun | None:
         )
 
     try:
-        check_openable(path)
+        if not locked:
+            check_openable(path)
         shared_validator().validate(path)
         return read_file(path, inspect)
     except errors.RunError:
         return None
+
+
+def finished_run(path: Path, samples: int) -> StoredRun | None:
+    """A run of so many samples that a writer finished which gave no answer, once it is sound and on disk.
+
+    The writer holds its lock still, and may not have read the file again and synced it. None for any other.
+    """
+    run = inspect_run(path, locked=True)
+    if run is None or run.end is None or run.samples != samples:
+        return None
+    try:
+        read_file(path, check_samples)
+        sync_file(path)
+        sync_folder(path.parent)
+    except (errors.RunError, OSError):
+        return None
+    return StoredRun(str(path), samples, run.raw_bytes_stored)
 
 
 def contains_all_samples(rebuilt: Path, other: Path) -> bool:

@@ -68,6 +68,11 @@ def encode_record(data: bytes, arrival_ns: int, kind: RecordKind = RecordKind.WI
     return _FRONT.pack(kind, len(data), arrival_ns, checksum) + data
 
 
+def is_read(record: bytes) -> bool:
+    """Tell whether an encoded record holds received bytes."""
+    return record[0] == RecordKind.WIRE
+
+
 def read_journal(path: Path, start: int = 0) -> Iterator[JournalRecord]:
     """Records of a journal from byte `start` to its end or first torn record. Raises OSError, ValueError."""
     with path.open("rb", buffering=0) as file:

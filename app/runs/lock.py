@@ -71,6 +71,12 @@ def recording_lock(run: Path) -> FileLock:
     return FileLock(run.with_name(run.name + RECORDING_SUFFIX))
 
 
+def remove_lock(run: Path) -> None:
+    """Remove the lock of a writer that was killed, as soon as it is dead; another one's stays."""
+    with contextlib.suppress(LockHeldError, OSError), recording_lock(run):
+        pass
+
+
 def is_being_recorded(run: Path) -> bool:
     """Tell whether a living process is recording `run`."""
     return is_held(run.with_name(run.name + RECORDING_SUFFIX))

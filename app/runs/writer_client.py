@@ -198,6 +198,10 @@ class WriterClient:
         """Count as failed: the process gives no answer."""
         self._fail(error)
 
+    def kill(self) -> None:
+        """End a process that gives no answer at once, so that the run it has finished is locked no longer."""
+        self._child.kill()
+
     def stop(self) -> None:
         """End the process; a run still open is closed as interrupted."""
         self._child.stop(_STOP_S)

@@ -19,7 +19,11 @@ _FIRST_MAX_WAIT_NS = 2_000_000_000
 _KEPT_NS = 10_000_000_000
 MAX_WAITING = 4 * MAX_BLOCK_ROWS
 """Readings of a gauge that may wait. No device sends more in seconds; garbage can claim gaps of so many."""
-_REACH = 1.5  # a row takes a reading that is no further than so many periods of its device
+_REACH = 0.75
+"""A row takes a reading that is no further than so many periods of its device: the nearest is within half a
+period, and one that is a period away is that of another row."""
+_JITTER_REACH, _JITTER_NS = 1.5, 2_000_000
+"""The same where a period is as short as the errors of times by the host's clock, which are no longer."""
 _OVERLOAD = int(SampleStatus.OVERLOAD_TABLE)
 _OVERLOADS = (SampleStatus.OVERLOAD_TABLE, SampleStatus.OVERLOAD_RELATIVE)
 _ALONE = (SampleStatus.TABLE_MISSING, SampleStatus.RELATIVE_MISSING)
@@ -78,7 +82,8 @@ class Merger:
 
     def __init__(self, base: int, other_period_s: float) -> None:
         self._base = base
-        self._reach_ns = round(_REACH * other_period_s * 1e9)
+        period_ns = other_period_s * 1e9
+        self._reach_ns = round(max(_REACH * period_ns, min(_JITTER_REACH * period_ns, _JITTER_NS)))
         self._waiting = [NO_SAMPLES, NO_SAMPLES]
         self._patience_ns = _FIRST_MAX_WAIT_NS
 

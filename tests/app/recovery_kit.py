@@ -33,7 +33,7 @@ TIMETABLE = Timetable(rest_s=0.8, pull_s=0.6, hold_s=0.6, decay_s=3.0, recentre_
 RELEASED = round(TIMETABLE.release_s * RATE_HZ)
 IDENTIFIER = "6b1f0f6e-0000-4000-8000-000000000001"
 TIME_BASE = TimeBase(1.00003, 2e-5)
-_PER_FRAME = 4
+PER_FRAME = 4
 
 
 def stand_counts(samples: int) -> np.ndarray:
@@ -52,7 +52,7 @@ def wire(protocol: str, faults: int = 0) -> list[bytes]:
     if protocol == "csv":
         units = encode_lines(LineFormat(), times_us * 1e-6, COUNTS)
     else:
-        frames = encode_frames(7, times_us[::_PER_FRAME], COUNTS)
+        frames = encode_frames(7, times_us[::PER_FRAME], COUNTS)
         units = [frame.tobytes() for frame in frames]
     random = np.random.default_rng(1)
     for place in random.choice(np.arange(20, len(units)), faults, replace=False).tolist():

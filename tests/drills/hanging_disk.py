@@ -8,6 +8,7 @@ disk is back, all samples that were told must be rebuilt.
 """
 
 import contextlib
+import itertools
 import os
 import shutil
 import signal
@@ -31,17 +32,20 @@ from app.acquisition.messages import (
     RunStarted,
     StateChanged,
 )
-from app.runs.reader import open_run
+from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from tests.drills.disk_full import environment
+from tests.drills.kill_engine import ask
 from tests.drills.preload import SYNC, build_library, has_compiler
 from tests.drills.report import DrillReport, arguments
+from tests.drills.sent import Sent
 from tests.drills.unplug import wait_for
 
 RATE_HZ = 500.0
 TOLD_S, ENDED_S = 2.0, 10.0
+FALLBACK = "fallback"
 
 
 @dataclass(slots=True)
@@ -147,21 +151,22 @@ def hanging_disk(count: int, folder: Path, kind: str = "disk") -> HangReport:
         for number in range(count):
             place = folder / str(number)
             place.mkdir()
-            fallback = place / "fallback"
             with (
                 KINDS[kind](place) as disk,
-                environment("XDG_DATA_HOME", str(fallback)),
+                environment("XDG_DATA_HOME", str(place / FALLBACK)),
                 EngineClient.start(port, *files) as engine,
             ):
                 try:
-                    _one_run(disk, engine, place, fallback, report)
+                    _one_run(disk, engine, place, stand, report)
                 except (ValueError, TimeoutError, OSError) as error:
                     report.faults.append(f"run {number}: {error}")
                 disk.go_on()
     return report
 
 
-def _one_run(disk: Disk, engine: EngineClient, place: Path, fallback: Path, report: HangReport) -> None:
+def _one_run(
+    disk: Disk, engine: EngineClient, place: Path, stand: SimulatedStand, report: HangReport
+) -> None:
     wait_for(engine, Connected)
     run = RunSettings(str(disk.folder), series="1FFM0", trigger="none", duration_s=60.0)
     engine.send(Arm(run))
@@ -188,7 +193,8 @@ def _one_run(disk: Disk, engine: EngineClient, place: Path, fallback: Path, repo
     if good.ended is not EndReason.DURATION:  # type: ignore[attr-defined]
         raise ValueError(f"the next run ended as {good.ended}: {good.message}")  # type: ignore[attr-defined]
     disk.go_on()
-    _check_rebuilt(disk.folder, fallback / "Slipstand" / "journals", ended, report)
+    folders = (disk.folder, place / FALLBACK / "Slipstand" / "journals")
+    _check_rebuilt(folders, stand, ended, report)
     slow = [s for s, limit_s in ((report.told_s[-1], TOLD_S), (report.ended_s[-1], ENDED_S)) if s > limit_s]
     if slow:
         raise ValueError(f"too slow: {slow}")
@@ -210,23 +216,30 @@ def _health(engine: EngineClient) -> int:
     return event.samples
 
 
-def _check_rebuilt(share: Path, fallback: Path, ended: RunEnded, report: HangReport) -> None:
-    """Recover both journals; the two runs must hold all samples that were told."""
+def _check_rebuilt(
+    folders: tuple[Path, Path], stand: SimulatedStand, ended: RunEnded, report: HangReport
+) -> None:
+    """Recover both journals; the two runs must hold all samples that were told, without a hole."""
     deadline_s = time.monotonic() + 30.0
-    while any(share.glob("*.recording")) and time.monotonic() < deadline_s:
+    while any(folders[0].glob("*.recording")) and time.monotonic() < deadline_s:
         time.sleep(0.1)  # what was waited for is written, and the locks are released
-    samples = 0
-    for folder in (share, fallback):
-        for recovery in recover_folder(folder):
-            if recovery.state is RecoveryState.EMPTY:  # nothing came after the disk was left
-                continue
-            if not recovery.run:
-                raise ValueError(f"{recovery.journal}: {recovery.state}, {recovery.message}")
-            samples += len(open_run(Path(recovery.run)))
+    parts: list[tuple[int, int]] = []
+    for recovery in (found for folder in folders for found in recover_folder(folder)):
+        if recovery.state is RecoveryState.EMPTY:  # nothing came after the disk was left
+            continue
+        if not recovery.run:
+            raise ValueError(f"{recovery.journal}: {recovery.state}, {recovery.message}")
+        run = open_run(Path(recovery.run))
+        counts = load_counts(run)
+        assert counts is not None
+        end = Sent().check(ask(stand), counts, run.status)
+        parts.append((end - len(run), end))
     report.runs += 1
+    holes = [after[0] - before[1] for before, after in itertools.pairwise(parts) if after[0] > before[1]]
+    samples = parts[-1][1] - parts[0][0] if parts else 0
     report.samples += samples
-    if samples < ended.samples:
-        raise ValueError(f"{samples} samples of {ended.samples} were rebuilt: {ended.message}")
+    if holes or samples < ended.samples:
+        raise ValueError(f"{samples} samples of {ended.samples}, less {holes}, are rebuilt: {ended.message}")
 
 
 def main() -> int:

@@ -2,9 +2,10 @@
 
 Engine, writer and live identification, and where something is killed the simulated stand too, are stopped
 (SIGSTOP) at random moments for 0.2 to 5 s, one of them or all, as an overloaded computer does to them, while
-an engine starts and records a run, the recording program or the engine is killed, or files may not grow. Rows
-that the engine could not fetch in time are marked and no others, each run ends with a reason that is true, no
-fault of the device is told of that was none, and no process stays.
+an engine starts and records a run, the recording program or the engine is killed, or files may not grow. Or a
+writer is stopped for 130 s at the end of its run (`stopped_writer`). Rows that the engine could not fetch in
+time are marked and no others, each run ends with a reason that is true, no fault of the device is told of
+that was none, and no process stays.
 """
 
 import random
@@ -41,6 +42,7 @@ from tests.drills.processes import descendants_of, gone
 from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent
 from tests.drills.starving import ROLES, Starving
+from tests.drills.stopped_writer import stopped_writer
 
 RATE_HZ = 1000.0
 DURATION_S = 6.0
@@ -196,6 +198,7 @@ def main() -> int:
     }
     ways["window killed"] = partial(kill_window, seed=given.seed, starve=tuple(ROLES))
     ways["engine killed"] = partial(kill_engine, seed=given.seed, starve=tuple(ROLES))
+    ways["writer stopped for 130 s"] = partial(stopped_writer, seed=given.seed)
     ways["disk full"] = partial(disk_full, way="limit", seed=given.seed, starve=tuple(ROLES))
     chosen = {name: way for name, way in ways.items() if name.startswith(given.only)}
     return run_ways(given.count, chosen if sys.platform == "linux" else {})

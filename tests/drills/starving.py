@@ -100,10 +100,11 @@ class Starving:
         self._known = {one for one in self._known if is_alive(one)}
         for one in [os.getpid(), *self._known]:
             self._known.update(descendants_of(one))
-        return [one for one in sorted(self._known) if any(_is_a(one, role) for role in roles)]
+        return [one for one in sorted(self._known) if any(is_a(one, role) for role in roles)]
 
 
-def _is_a(process_id: int, role: str) -> bool:
+def is_a(process_id: int, role: str) -> bool:
+    """Tell whether a process is one of a role of `ROLES`."""
     with contextlib.suppress(OSError):
         return ROLES[role].encode() in Path(f"/proc/{process_id}/cmdline").read_bytes().split(b"\0")
     return False

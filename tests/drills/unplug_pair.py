@@ -129,6 +129,8 @@ def _check(
     )
     there = np.setdiff1d(np.arange(len(run)), gone[lost])
     again_s = began_s + run.time_s[there] - returned_s
+    if not (again_s > 0.0).any():
+        raise ValueError("not back before the end of the run")
     report.back_after_s.append(float(again_s[again_s > 0.0].min()))
     if report.back_after_s[-1] > RETURN_LIMIT_S:
         raise ValueError(f"back only {report.back_after_s[-1]:.2f} s after the return")

@@ -6,19 +6,25 @@ import logging
 import os
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import IO
 
+import msgspec
+
+from app.acquisition.journal.records import Continued
 from app.runs.disk import has_free_space, unfinished_name
-from app.runs.journal import MAGIC
+from app.runs.journal import MAGIC, RecordKind, encode_record, is_read
 from app.runs.lock import FileLock, LockHeldError, recording_lock
 from app.runs.paths import make_private_folder
 from config.durable_files import give_new_name, make_folders, sync_descriptor, sync_folder
+from drivers.host_time import host_ns
 
 _log = logging.getLogger(__name__)
 
 _PIECE_BYTES = 1 << 20
+_REPEATED_BYTES = 4096  # more than a frame of any device
 _ROOM_BYTES = 32 << 20
 """Least free space of a fallback folder beyond what is copied: with less it would be full as soon."""
 
@@ -48,7 +54,7 @@ class JournalFile:
     When the disk is full, the network share gone, or the folder read-only, all that was written moves to the
     first of the fallback folders that takes it, and the rest is appended there. What can no longer be read
     stays where it is; the new file then begins with `first`, the magic and the record that identifies the
-    run.
+    run, tells how many reads stay there, and repeats the last of them, since a frame may lie across two.
     """
 
     def __init__(
@@ -59,6 +65,8 @@ class JournalFile:
         self._file = file
         self._first = first
         self.size = len(first)  # bytes of all whole records
+        self._reads = 0  # of the run, in this file and in those that it continues
+        self._recent: deque[bytes] = deque()  # the last of them, as records
         self._lock = lock
         self._fallback_folders = list(fallback_folders)
         self._sync: FileSync | None = None
@@ -68,7 +76,7 @@ class JournalFile:
     def successor(self) -> "JournalFile":
         """A journal of the same run that begins in a fallback folder; the first `append` makes its file."""
         made = JournalFile(self.path, self._file, self._first, self._lock, self._fallback_folders)
-        made._is_made = False
+        made._is_made, made._reads, made._recent = False, self._reads, self._recent.copy()
         return made
 
     @property
@@ -88,6 +96,8 @@ class JournalFile:
                 self._move(error)
             else:
                 self.size += len(record)
+                if is_read(record):
+                    self._remember(record)
                 return
 
     def begin_sync(self) -> None:
@@ -135,11 +145,24 @@ class JournalFile:
             path = folder / self.path.name
             with contextlib.suppress(OSError, LockHeldError):
                 make_private_folder(folder)
-                file, lock = _make_file(path, lambda made: _write_all(made, self._first))
+                file, lock = _make_file(path, self._begin_in)
                 self.path, self._file, self._lock, self._is_made = path, file, lock, True
-                self.size = len(self._first)
                 return
         raise TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
+
+    def _remember(self, record: bytes) -> None:
+        self._reads += 1
+        self._recent.append(record)
+        while sum(map(len, self._recent)) - len(self._recent[0]) >= _REPEATED_BYTES:
+            self._recent.popleft()
+
+    def _begin_in(self, file: IO[bytes]) -> None:
+        """Begin a file that continues one which cannot be read."""
+        continued = msgspec.json.encode(Continued(self._reads - len(self._recent)))
+        beginning = self._first + encode_record(continued, host_ns(), RecordKind.NOTE)
+        beginning += b"".join(self._recent)
+        _write_all(file, beginning)
+        self.size = len(beginning)
 
     def _move(self, error: OSError) -> None:
         while self._fallback_folders:
@@ -174,8 +197,7 @@ class JournalFile:
             self._is_copied = False
             file.seek(0)
             file.truncate()
-            _write_all(file, self._first)
-            self.size = len(self._first)
+            self._begin_in(file)
 
     def _pieces(self) -> Iterator[bytes]:
         left = self.size

@@ -88,6 +88,8 @@ class Journal:
 
     @property
     def move_message(self) -> Message:
+        if self.left is not None and self.left == self.path:  # the other one is not made yet
+            return EMPTY
         if self.left is not None:
             template = N_(
                 "the disk of the run hangs: what came before is in {left}, the received bytes since are kept"

@@ -59,7 +59,7 @@ class Replay:
         self._source = _source(summary)
         self._losses = Losses()
         self._offset: int | None = None
-        self._reads = 0
+        self._reads = summary.earlier_reads
         self._counted: deque[tuple[int, int]] = deque()
         """Reads, and samples up to these, that no checkpoint has passed yet."""
         self._opened_after: int | None = summary.opened.reads if summary.opened else None
@@ -226,7 +226,7 @@ def _filled(
             progress(read.start / size)
     if waiting:
         write_waiting()
-    if summary.ended is not None:
+    if summary.ended is not None and summary.opened is not None:
         ending = summary.ended.ending
     else:
         ending = _ending(summary, opened, next_index, statistics, replay)
@@ -310,8 +310,9 @@ def _ending(
     untimed = TimeBase.from_estimates(None, None)
     mark = summary.checkpoint or Mark(next_index, opened.start_index, Known(), untimed)
     time_base = mark.time_base.with_skew(replay.skew(opened.start_index, next_index))
+    ended = summary.ended.ending if summary.ended else None  # of the whole run, of which this is a part
     notes = (
-        INTERRUPTED_NOTE,
+        ended.message if ended else INTERRUPTED_NOTE,
         DIFFERS_NOTE.capitalize() if replay.differs else "",
         str(time_base.skew_message),
     )
@@ -320,7 +321,7 @@ def _ending(
         msgspec.structs.replace(mark, time_base=time_base),
         opened.start_index,
         summary.rate_hz,
-        str(EndReason.INTERRUPTED),
+        ended.ended if ended else str(EndReason.INTERRUPTED),
         opened.start_time + datetime.timedelta(seconds=length_s),
         statistics.losses(),
         ". ".join(filter(None, notes)),

@@ -28,6 +28,12 @@ class JournalHeader(msgspec.Struct, frozen=True, tag=True):
     program: str
 
 
+class Continued(msgspec.Struct, frozen=True, tag=True):
+    """The journal begins after so many reads of its run, which stay on a disk that hangs or is gone."""
+
+    reads: int
+
+
 class Known(msgspec.Struct, frozen=True):
     """Measurement of the pullback until then, as sample indices and displacements (m); None where unknown."""
 
@@ -113,7 +119,7 @@ def end_metadata(
     )
 
 
-MetadataRecord = JournalHeader | Mark | Opened | Named | Ended
+MetadataRecord = JournalHeader | Continued | Mark | Opened | Named | Ended
 decode_metadata_record: Callable[[bytes], MetadataRecord] = msgspec.json.Decoder(MetadataRecord).decode
 
 
@@ -127,6 +133,8 @@ class JournalSummary:
     opened: Opened | None
     named: Named | None
     ended: Ended | None
+    earlier_reads: int
+    """Reads of the run that came before the first one of this journal."""
     wire_bytes: int
     end: int
     """Byte after the last whole record; behind it nothing is trusted."""
@@ -169,6 +177,7 @@ def read_summary(path: Path) -> JournalSummary:
         opened=records.get(Opened),
         named=records.get(Named),
         ended=records.get(Ended),
+        earlier_reads=records.get(Continued, Continued(0)).reads,
         wire_bytes=wire_bytes,
         end=end,
     )

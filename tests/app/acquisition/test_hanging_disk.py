@@ -13,10 +13,12 @@ from app.acquisition.errors import JournalError
 from app.acquisition.journal.file import create_journal_file
 from app.acquisition.journal.journal import Journal
 from app.acquisition.messages import EndReason, RunSettings, StateChanged
+from app.runs import file_operations
 from app.runs.blocks import RunBlock
 from app.runs.journal import RecordKind, encode_record, read_journal
-from app.runs.lock import is_being_recorded
+from app.runs.lock import is_being_recorded, recording_lock
 from app.runs.metadata import EndMetadata
+from app.runs.reader import open_run
 from app.runs.writer import write_run
 from messages.message import EMPTY
 from tests.app.acquisition.test_recording import Bench, RememberingWriter, answer
@@ -90,14 +92,13 @@ def test_a_journal_goes_on_elsewhere_where_syncs_alone_hang(tmp_path, monkeypatc
     monkeypatch.setattr("app.acquisition.journal.file.sync_descriptor", sync)
     journal.append(b"one", 1)
     assert is_asked.wait(10.0)
-    wait_until(lambda: journal._task is None)
-    assert journal.stalled_s > 0.0
+    wait_until(lambda: journal._task is None and journal.stalled_s > 0.0)
     assert journal.leave_hanging_disk()
     is_left.set()
     assert journal.stalled_s == 0.0
     journal.append(b"two", 2)
     journal.close()
-    assert (data(path), data(journal.path)) == ([b"one"], [b"two"])
+    assert (data(path), data(journal.path)) == ([b"one"], [b"one", b"two"])
     assert is_being_recorded(path), "the disk may still sync it"
     is_there.set()
     wait_until(lambda: not is_being_recorded(path))
@@ -127,13 +128,14 @@ def test_the_operator_is_told_of_a_disk_that_hangs_and_the_run_ends(tmp_path, mo
 
 
 class StoppedWriter(RememberingWriter):
-    """Writes a whole file, and gives no answer."""
+    """Writes a whole file, holds its lock, and gives no answer."""
 
     def __init__(self, path, *, has_finished) -> None:
         super().__init__()
         self.path = path
         self.has_finished = has_finished
         self.given_up = []
+        self.lock = recording_lock(path)
 
     def open(self, request):
         self.request = request
@@ -144,10 +146,14 @@ class StoppedWriter(RememberingWriter):
             names = [field.name for field in dataclasses.fields(RunBlock)]
             columns = [np.concatenate([getattr(block, name) for block in self.blocks]) for name in names]
             write_run(self.path, self.request.metadata, RunBlock(*columns), ending)
+        self.lock.acquire()
         return Future()
 
     def give_up(self, error):
         self.given_up.append(error)
+
+    def kill(self):
+        self.lock._file.close()  # as the system does
 
 
 @pytest.mark.parametrize("has_finished", [True, False])
@@ -162,6 +168,32 @@ def test_a_run_that_a_stopped_writer_had_finished_is_no_fault(tmp_path, monkeypa
     assert ended.samples > 0
     assert writer.given_up, "the next run has another writer"
     assert ("gives no answer" in str(ended.message)) is not has_finished
+    if has_finished:
+        assert not writer.lock.path.exists()
+        open_run(writer.path)
+    writer.lock.release()
+
+
+def test_a_disk_that_hangs_when_a_finished_run_is_looked_for_does_not_hold_the_end(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_file, "_CLOSING_S", 0.2)
+    monkeypatch.setattr(run_file, "_INSPECTION_S", 0.2)
+    is_there, looked = threading.Event(), threading.Event()
+
+    def hang(*_):
+        is_there.wait(60.0)
+        looked.set()
+
+    monkeypatch.setattr(file_operations, "sync_file", hang)
+    run = RunSettings(str(tmp_path), series="1FFM0", trigger="none", duration_s=0.4)
+    writer = StoppedWriter(tmp_path / "run.h5", has_finished=True)
+    bench = Bench(tmp_path, run, writer=writer)
+    bench.play(400)
+    ended = bench.ended()
+    is_there.set()
+    writer.lock.release()
+    assert ended.ended is EndReason.WRITE_ERROR
+    assert bench.journal.path.exists()
+    assert looked.wait(10.0)
 
 
 def test_arming_waits_for_no_disk_that_hangs(tmp_path):

@@ -10,6 +10,7 @@ from disk_kit import FailingFile
 from app.acquisition.errors import JournalFullError
 from app.acquisition.journal.file import JournalFile, create_journal_file
 from app.acquisition.journal.journal import Journal
+from app.acquisition.journal.records import Continued, decode_metadata_record
 from app.runs.journal import RecordKind, encode_record, read_journal
 from app.runs.lock import is_being_recorded
 
@@ -56,6 +57,7 @@ def test_all_of_it_moves_wherever_the_write_failed(tmp_path, room, code):
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows renames no file that is open")
 def test_a_journal_that_can_no_longer_be_read_stays_and_the_rest_goes_elsewhere(tmp_path, monkeypatch):
     path, refuge = tmp_path / "share" / "run.journal", tmp_path / "refuge"
+    monkeypatch.setattr("app.acquisition.journal.file._REPEATED_BYTES", 60)
     file = failing(path, [refuge], room=4 * 50, code=errno.ESTALE)
     for number, data in enumerate(READS[:4]):
         file.append(encode_record(data, number))
@@ -64,9 +66,10 @@ def test_a_journal_that_can_no_longer_be_read_stays_and_the_rest_goes_elsewhere(
     for number, data in enumerate(READS[4:], 4):
         file.append(encode_record(data, number))
     file.close()
-    first, *_ = read_journal(file.path)
+    first, continued, *_ = read_journal(file.path)
     assert first.data == b"{}"
-    assert wire_of(file.path) == READS[4:]
+    assert decode_metadata_record(continued.data) == Continued(2)
+    assert wire_of(file.path) == READS[2:]
     assert wire_of(hidden) == READS[:4]
     file.release()
 

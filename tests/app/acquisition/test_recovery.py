@@ -10,6 +10,7 @@ from raw_bytes_kit import load_raw_bytes
 from recovery_kit import (
     COUNTS,
     IDENTIFIER,
+    PER_FRAME,
     RATE_HZ,
     RELEASED,
     TIME_BASE,
@@ -23,12 +24,16 @@ from recovery_kit import (
 from app.acquisition.errors import RecoveryError
 from app.acquisition.journal import recovery
 from app.acquisition.journal.recovery import RecoveryState, recover_folder, recover_journal
+from app.acquisition.messages import EndReason
 from app.runs.edits import edit_run
 from app.runs.errors import DamagedRunError
 from app.runs.journal import MAGIC, RecordKind, encode_record, read_journal, unfinished_journals
 from app.runs.lock import recording_lock
 from app.runs.reader import load_counts, open_run
 from drivers.samples import SampleStatus
+from messages.message import message
+from tests.app.acquisition.test_hanging_disk import HangingFile
+from tests.waiting import wait_until
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
@@ -101,6 +106,50 @@ def test_what_is_in_the_journal_before_it_is_decoded_changes_no_bit(tmp_path, wr
     assert recovered.samples == ended.samples
     assert not open_run(recovered.run).end.message
     assert_same(datasets(recovered.run), datasets(ended.path))
+
+
+@pytest.mark.parametrize("hangs", ["write", "sync"])
+def test_a_journal_that_goes_on_elsewhere_is_rebuilt_from_its_first_sample(tmp_path, writer, hangs):
+    desk = Desk(tmp_path, writer, "slipstand-binary")
+    pending = reads(wire("slipstand-binary"))
+    recorded(desk, pending, armed_at=300, until=700, trigger="none", duration_s=60.0)
+    journal = desk._journal
+    old, file = journal._thread, journal._file
+    wait_until(lambda: journal.written == journal.size)
+    file._fallback_folders = [tmp_path / "other"]
+    disk = HangingFile(file._file)
+    if hangs == "write":
+        file._file = disk
+        desk.take(next(pending))
+        assert disk.is_asked.wait(10.0)
+        assert journal.leave_hanging_disk()
+    else:
+        journal._file = file.successor()
+        journal.left = desk.journal
+    for read in pending:
+        desk.take(read)
+    desk.recording.end(EndReason.WRITE_ERROR, message("it hung"))
+    desk.ended()
+    disk.is_there.set()
+    old.join(10.0)
+    file.close()
+    file.release()
+    parts = []
+    for name, path in (("before", desk.journal), ("since", journal.path)):
+        place = tmp_path / name
+        place.mkdir()
+        shutil.copy(path, place)
+        (found,) = recover_folder(place)
+        parts.append(open_run(found.run))
+    before, since = parts
+    begins = len(COUNTS) - len(since)
+    armed = int(np.flatnonzero((load_counts(before)[0] == COUNTS).all(axis=1))[0])
+    assert np.array_equal(load_counts(before), COUNTS[armed : armed + len(before)])
+    assert np.array_equal(load_counts(since)[PER_FRAME:], COUNTS[begins + PER_FRAME :])
+    assert begins + PER_FRAME <= armed + len(before), "no sample is in neither"
+    assert since.end.ended == EndReason.WRITE_ERROR
+    assert since.end.losses.samples == len(since)
+    assert since.end.events.release_s == pytest.approx((RELEASED - begins) / RATE_HZ, abs=0.02)
 
 
 def test_what_a_dying_engine_had_not_decoded_is_recovered(tmp_path, writer):

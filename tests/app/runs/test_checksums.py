@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from runs_kit import ENDING, block
 
-from app.runs import schema
+from app.runs import file_operations, schema
 from app.runs.edits import edit_run
 from app.runs.errors import DamagedRunError
+from app.runs.file_operations import finished_run
 from app.runs.reader import load_counts, open_run
 from app.runs.writer import create_run, write_run
 
@@ -50,6 +51,24 @@ def test_a_flipped_bit_in_counts_is_noticed_when_they_are_read(run, column):
     opened = open_run(run)
     with pytest.raises(DamagedRunError, match=f"/{column} is not what was stored"):
         load_counts(opened)
+
+
+@pytest.mark.parametrize("column", READ + COUNTS)
+def test_a_run_that_its_writer_left_is_taken_for_whole_only_if_it_is_sound(run, column):
+    assert finished_run(run, ROWS - 1) is None
+    stored = finished_run(run, ROWS)
+    assert stored is not None
+    assert stored.samples == ROWS
+    flip(run, column)
+    assert finished_run(run, ROWS) is None
+
+
+def test_a_run_that_its_writer_left_is_synced_before_its_journal_goes(run, monkeypatch):
+    synced = []
+    monkeypatch.setattr(file_operations, "sync_file", synced.append)
+    monkeypatch.setattr(file_operations, "sync_folder", synced.append)
+    finished_run(run, ROWS)
+    assert synced == [run, run.parent]
 
 
 def test_counts_are_checked_before_they_are_calibrated_anew(run, metadata):

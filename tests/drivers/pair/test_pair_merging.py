@@ -41,7 +41,18 @@ def test_a_row_waits_for_a_reading_that_is_not_earlier_and_then_for_none():
     assert merger.take(NS // 10) is None
     assert not merger.is_overdue(NS * 35 // 100)
     assert merger.is_overdue(NS * 36 // 100)
-    assert merger.take(NS * 36 // 100).status.tolist() == [0]  # the one before is near enough
+    assert merger.take(NS * 36 // 100).status.tolist() == [SampleStatus.RELATIVE_MISSING]
+
+
+@pytest.mark.parametrize(("period_s", "is_repeated"), [(0.05, False), (0.01, False), (0.0001, True)])
+def test_a_reading_is_not_repeated_in_the_row_of_one_that_is_missing(period_s, is_repeated):
+    """Only where a period is as short as the errors of the host's times."""
+    period_ns = round(period_s * NS)
+    merger = Merger(0, other_period_s=period_s)
+    merger.add(1, readings([0, period_ns, 3 * period_ns], [1, 2, 4]))
+    merger.add(0, readings([0, period_ns, 2 * period_ns, 3 * period_ns]))
+    rows = merger.take(NS)
+    assert rows.is_paired.tolist() == [True, True, is_repeated, True]
 
 
 def test_flags_of_each_gauge():
