@@ -12,7 +12,7 @@ from pathlib import Path
 
 import platformdirs
 
-from tools.windows import checks
+from tools.windows import checks, suite
 from tools.windows.checks import Check
 from tools.windows.environment import EnvironmentMissingError, WindowsEnvironment
 
@@ -32,8 +32,9 @@ def main() -> int:
     parser.add_argument("steps", nargs="*", metavar="STEP", help=f"some of: {', '.join(steps)}")
     parser.add_argument("--folder", type=Path, default=default_folder(), help="where all is kept")
     parser.add_argument(
-        "--parts", nargs="+", default=checks.TEST_PARTS, metavar="PART", help="files or folders of tests"
-    )
+        "--parts", nargs="+", default=list(suite.PARTS), metavar="PART",
+        help=f"of the tests: {', '.join(suite.PARTS)}; or files and folders",
+    )  # fmt: skip
     parser.add_argument("--display", type=int, default=77, help="number of the display that is made")
     arguments = parser.parse_args()
     if unknown := set(arguments.steps) - set(steps):

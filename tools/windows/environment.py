@@ -94,7 +94,7 @@ class WindowsEnvironment:
         copied = self.inside / "slipstand"
         for name in filter(None, listed.split("\0")):
             source, target = PROJECT / name, copied / name
-            if source.is_file() and not source.is_relative_to(PROJECT / "recordings"):
+            if source.is_file():
                 target.parent.mkdir(parents=True, exist_ok=True)
                 if not (target.is_file() and filecmp.cmp(source, target, shallow=False)):
                     shutil.copy2(source, target)

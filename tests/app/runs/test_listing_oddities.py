@@ -14,8 +14,9 @@ import pytest
 from runs_kit import ANALYSIS, small_run
 
 from app.runs import listing as library_module
-from app.runs.listing import RunFilter, index_path, list_runs
+from app.runs.listing import index_path, list_runs
 from app.runs.metadata import IMPORT_PROTOCOL
+from app.runs.run_filter import RunFilter
 from app.runs.saved_analyses import save_analysis
 from drivers.samples import DeviceIdentity
 from messages.message import Message

@@ -1,0 +1,123 @@
+"""The tests on Windows under Wine, part by part; the counts of each part are kept until it is run again."""
+
+import json
+import re
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from tools.windows.environment import PROJECT, WindowsEnvironment
+
+PARTS: Mapping[str, Sequence[str]] = {
+    "configuration": ("tests/config", "tests/messages"),
+    "simulated stand": ("tests/app/simulated_stand",),
+    "drivers": ("tests/drivers",),
+    "acquisition": ("tests/app/acquisition",),
+    "runs": ("tests/app/runs/test_*.py",),
+    "exchange": ("tests/app/runs/exchange",),
+    "campaigns": ("tests/app/runs/campaign", "tests/analysis/campaign"),
+    "processes": ("tests/app/runs/batch", "tests/app/test_*.py"),
+    "command line": ("tests/app/cli",),
+    "presenters": ("tests/app/presenters",),
+    "window": ("tests/app/qt",),
+    "reports": ("tests/app/reports",),
+    "analysis": ("tests/analysis/test_*.py", "tests/analysis/[!cd_]*/", "tests/analysis/calibration"),
+    "house": ("tests/house",),
+}
+"""Files and folders of each part, as patterns."""
+_PART_S = 3600.0
+_TEST_S = 300.0  # Wine opens files slowly, and some tests open thousands
+_DASK = "tests/app/runs/batch/test_dask_executor.py"
+"""Its cluster does not start under Wine, and the test would wait for it."""
+_ENDED = re.compile(r"(?m)^(tests/\S+?::.*?) (PASSED|FAILED|ERROR|SKIPPED|XFAIL)\b")
+_SELECTED = re.compile(r"collected (\d+) items?(?:.*?/ (\d+) selected)?")
+
+
+@dataclass(frozen=True)
+class PartResult:
+    """What the tests of a part gave; `not_run` are those after the end of its time, or of its process."""
+
+    part: str
+    date: str
+    commit: str
+    passed: int
+    failed: tuple[str, ...]
+    skipped: int
+    not_run: int
+    took_s: float
+
+
+def run_part(environment: WindowsEnvironment, part: str, folder: Path) -> PartResult:
+    """Run a part of PARTS, or files and folders separated by blanks, and keep its counts and its log.
+
+    Those in real time are left out: most of them need a pseudo-terminal.
+    """
+    patterns = PARTS.get(part) or part.split()
+    paths = sorted({path for pattern in patterns for path in PROJECT.glob(pattern)})
+    if not paths:
+        raise FileNotFoundError(f"no tests: {part}. Name one of {', '.join(PARTS)}, or files")
+    began_s = time.perf_counter()
+    try:
+        ended = environment.run_python(
+            "-m", "pytest", "-vv", "-m", "not peer and not realtime", "-rfE", "--tb=short", "--timeout",
+            f"{_TEST_S:g}", "--deselect", _DASK, *(path.relative_to(PROJECT).as_posix() for path in paths),
+            timeout_s=_PART_S,
+        )  # fmt: skip
+        said = ended.stdout + ended.stderr
+    except subprocess.TimeoutExpired as error:
+        said = (error.stdout or b"").decode(errors="replace")
+    found = _result(part, said, time.perf_counter() - began_s)
+    folder.mkdir(parents=True, exist_ok=True)
+    log_path(folder, part).write_text(said, encoding="utf-8")
+    kept = {**_kept(folder), part: asdict(found)}
+    (folder / "tests.json").write_text(json.dumps(kept, indent=1), encoding="utf-8")
+    return found
+
+
+def table(folder: Path) -> str:
+    """Table of what was kept of each part, in Markdown."""
+    rows = [
+        f"| {part} | {kept['passed']:,} | {len(kept['failed'])} | {kept['skipped']} | {kept['not_run']} | "
+        f"{kept['took_s']:.0f} | {kept['date']}, `{kept['commit']}` |"
+        for part, kept in _kept(folder).items()
+        if part in PARTS
+    ]
+    head = "| part | passed | failed | skipped | not run | s | date, commit |"
+    return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
+
+
+def log_path(folder: Path, part: str) -> Path:
+    """Path of what pytest wrote of a part."""
+    return folder / f"{re.sub(r'[^a-z0-9]+', '-', part.lower())}.log"
+
+
+def _result(part: str, said: str, took_s: float) -> PartResult:
+    outcomes = dict(_ENDED.findall(said))  # an error when it is torn down follows what it gave
+    failed = tuple(test for test, outcome in outcomes.items() if outcome in {"FAILED", "ERROR"})
+    passed = sum(outcome in {"PASSED", "XFAIL"} for outcome in outcomes.values())
+    counted = _SELECTED.search(said)
+    selected = int(counted[2] or counted[1]) if counted else 0
+    return PartResult(
+        part=part,
+        date=f"{datetime.now(UTC):%Y-%m-%d}",
+        commit=_commit(),
+        passed=passed,
+        failed=failed,
+        skipped=len(outcomes) - passed - len(failed),
+        not_run=selected - len(outcomes),
+        took_s=took_s,
+    )
+
+
+def _kept(folder: Path) -> dict[str, dict[str, object]]:
+    path = folder / "tests.json"
+    kept: dict[str, dict[str, object]] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    return {**{part: kept[part] for part in PARTS if part in kept}, **kept}
+
+
+def _commit() -> str:
+    command = ["git", "describe", "--always", "--dirty"]
+    return subprocess.run(command, cwd=PROJECT, check=True, capture_output=True, text=True).stdout.strip()
