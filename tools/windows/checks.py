@@ -117,11 +117,13 @@ def window(environment: WindowsEnvironment, display: int, pictures: Path) -> Ite
         yield Check(f"window, {theme}", bool(runs) and len(taken) == 2, figures.strip())
 
 
-def tests(environment: WindowsEnvironment, folder: Path, parts: Sequence[str]) -> Iterator[Check]:
+def tests(
+    environment: WindowsEnvironment, folder: Path, parts: Sequence[str], limit_s: float
+) -> Iterator[Check]:
     """Run the tests part by part; their counts, and the table of all parts, are kept in a folder."""
     environment.run_python("-m", "tools.compile_all", timeout_s=_COMPILE_S)
     for part in parts:
-        found = suite.run_part(environment, part, folder)
+        found = suite.run_part(environment, part, folder, limit_s)
         (folder / "tests.md").write_text(suite.table(folder), encoding="utf-8")
         counts = f"{found.passed} passed, {len(found.failed)} failed, {found.skipped} skipped"
         figures = f"{counts}, {found.not_run} not run in {found.took_s:.0f} s; {suite.log_path(folder, part)}"

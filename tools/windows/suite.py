@@ -25,10 +25,11 @@ PARTS: Mapping[str, Sequence[str]] = {
     "window": ("tests/app/qt",),
     "reports": ("tests/app/reports",),
     "analysis": ("tests/analysis/test_*.py", "tests/analysis/[!cd_]*/", "tests/analysis/calibration"),
+    "drills": ("tests/drills",),
+    "package and pages": ("tests/slipstand", "tests/test_*.py"),
     "house": ("tests/house",),
 }
 """Files and folders of each part, as patterns."""
-_PART_S = 3600.0
 _TEST_S = 300.0  # Wine opens files slowly, and some tests open thousands
 _DASK = "tests/app/runs/batch/test_dask_executor.py"
 """Its cluster does not start under Wine, and the test would wait for it."""
@@ -50,13 +51,12 @@ class PartResult:
     took_s: float
 
 
-def run_part(environment: WindowsEnvironment, part: str, folder: Path) -> PartResult:
+def run_part(environment: WindowsEnvironment, part: str, folder: Path, limit_s: float) -> PartResult:
     """Run a part of PARTS, or files and folders separated by blanks, and keep its counts and its log.
 
-    Those in real time are left out: most of them need a pseudo-terminal.
+    After `limit_s` it is ended. Those in real time are left out: most of them need a pseudo-terminal.
     """
-    patterns = PARTS.get(part) or part.split()
-    paths = sorted({path for pattern in patterns for path in PROJECT.glob(pattern)})
+    paths = paths_of(part)
     if not paths:
         raise FileNotFoundError(f"no tests: {part}. Name one of {', '.join(PARTS)}, or files")
     began_s = time.perf_counter()
@@ -64,17 +64,23 @@ def run_part(environment: WindowsEnvironment, part: str, folder: Path) -> PartRe
         ended = environment.run_python(
             "-m", "pytest", "-vv", "-m", "not peer and not realtime", "-rfE", "--tb=short", "--timeout",
             f"{_TEST_S:g}", "--deselect", _DASK, *(path.relative_to(PROJECT).as_posix() for path in paths),
-            timeout_s=_PART_S,
+            timeout_s=limit_s,
         )  # fmt: skip
         said = ended.stdout + ended.stderr
     except subprocess.TimeoutExpired as error:
         said = (error.stdout or b"").decode(errors="replace")
-    found = _result(part, said, time.perf_counter() - began_s)
+    found = read_result(part, said, time.perf_counter() - began_s)
     folder.mkdir(parents=True, exist_ok=True)
     log_path(folder, part).write_text(said, encoding="utf-8")
     kept = {**_kept(folder), part: asdict(found)}
     (folder / "tests.json").write_text(json.dumps(kept, indent=1), encoding="utf-8")
     return found
+
+
+def paths_of(part: str) -> list[Path]:
+    """Files and folders of a part of PARTS, or those that it names itself."""
+    patterns = PARTS.get(part) or part.split()
+    return sorted({path for pattern in patterns for path in PROJECT.glob(pattern)})
 
 
 def table(folder: Path) -> str:
@@ -94,7 +100,8 @@ def log_path(folder: Path, part: str) -> Path:
     return folder / f"{re.sub(r'[^a-z0-9]+', '-', part.lower())}.log"
 
 
-def _result(part: str, said: str, took_s: float) -> PartResult:
+def read_result(part: str, said: str, took_s: float) -> PartResult:
+    """Counts of what pytest said, also where it was ended before it counted."""
     outcomes = dict(_ENDED.findall(said))  # an error when it is torn down follows what it gave
     failed = tuple(test for test, outcome in outcomes.items() if outcome in {"FAILED", "ERROR"})
     passed = sum(outcome in {"PASSED", "XFAIL"} for outcome in outcomes.values())
