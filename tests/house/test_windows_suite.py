@@ -1,4 +1,4 @@
-"""Parts of the tests that are run under Wine: none but firmware is left out, and none counts that did not run."""
+"""Parts of the tests under Wine: all but firmware are in one, and none counts that did not run."""
 
 import pytest
 
