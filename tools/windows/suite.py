@@ -1,13 +1,14 @@
 """The tests on Windows under Wine, part by part; the counts of each part are kept until it is run again."""
 
-import json
 import re
 import subprocess
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+
+import msgspec
 
 from tools.windows.environment import PROJECT, WindowsEnvironment
 
@@ -15,21 +16,37 @@ PARTS: Mapping[str, Sequence[str]] = {
     "configuration": ("tests/config", "tests/messages"),
     "simulated stand": ("tests/app/simulated_stand",),
     "drivers": ("tests/drivers",),
-    "acquisition": ("tests/app/acquisition",),
-    "runs": ("tests/app/runs/test_*.py",),
+    "acquisition, a to k": ("tests/app/acquisition/test_[a-k]*.py",),
+    "acquisition, l to q": ("tests/app/acquisition/test_[l-q]*.py",),
+    "acquisition, r to z": ("tests/app/acquisition/test_[r-z]*.py",),
+    "runs, a to n": ("tests/app/runs/test_[a-n]*.py",),
+    "runs, o to z": ("tests/app/runs/test_[o-z]*.py",),
     "exchange": ("tests/app/runs/exchange",),
     "campaigns": ("tests/app/runs/campaign", "tests/analysis/campaign"),
     "processes": ("tests/app/runs/batch", "tests/app/test_*.py"),
-    "command line": ("tests/app/cli",),
+    "command line, a to c": ("tests/app/cli/test_[a-c]*.py",),
+    "command line, d to h": ("tests/app/cli/test_[d-h]*.py",),
+    "command line, i to r": ("tests/app/cli/test_[i-r]*.py",),
+    "command line, s to z": ("tests/app/cli/test_[s-z]*.py",),
     "presenters": ("tests/app/presenters",),
-    "window": ("tests/app/qt",),
+    "window, a to h": ("tests/app/qt/test_[a-h]*.py",),
+    "window, i": ("tests/app/qt/test_i*.py",),
+    "window, j to q": ("tests/app/qt/test_[j-q]*.py",),
+    "window, r": ("tests/app/qt/test_r*.py",),
+    "window, s to z": ("tests/app/qt/test_[s-z]*.py",),
     "reports": ("tests/app/reports",),
-    "analysis": ("tests/analysis/test_*.py", "tests/analysis/[!cd_]*/", "tests/analysis/calibration"),
+    "analysis, of one mass": ("tests/analysis/one_mass",),
+    "analysis, its folders": ("tests/analysis/[!cdo_]*/", "tests/analysis/calibration"),
+    "analysis, a to n": ("tests/analysis/test_[a-n]*.py",),
+    "analysis, o": ("tests/analysis/test_o*.py",),
+    "analysis, p to r": ("tests/analysis/test_[p-r]*.py",),
+    "analysis, s to z": ("tests/analysis/test_[s-z]*.py",),
     "drills": ("tests/drills",),
     "package and pages": ("tests/slipstand", "tests/test_*.py"),
     "house": ("tests/house",),
 }
-"""Files and folders of each part, as patterns."""
+"""Files and folders of each part, as patterns. What stands before a comma is one line of the table."""
+SUMMARY_NAME = "tests.json"
 _TEST_S = 300.0  # Wine opens files slowly, and some tests open thousands
 _DASK = "tests/app/runs/batch/test_dask_executor.py"
 """Its cluster does not start under Wine, and the test would wait for it."""
@@ -72,8 +89,7 @@ def run_part(environment: WindowsEnvironment, part: str, folder: Path, limit_s: 
     found = read_result(part, said, time.perf_counter() - began_s)
     folder.mkdir(parents=True, exist_ok=True)
     log_path(folder, part).write_text(said, encoding="utf-8")
-    kept = {**_kept(folder), part: asdict(found)}
-    (folder / "tests.json").write_text(json.dumps(kept, indent=1), encoding="utf-8")
+    (folder / SUMMARY_NAME).write_bytes(msgspec.json.encode(_kept(folder) | {part: found}))
     return found
 
 
@@ -84,15 +100,12 @@ def paths_of(part: str) -> list[Path]:
 
 
 def table(folder: Path) -> str:
-    """Table of what was kept of each part, in Markdown."""
-    rows = [
-        f"| {part} | {kept['passed']:,} | {len(kept['failed'])} | {kept['skipped']} | {kept['not_run']} | "
-        f"{kept['took_s']:.0f} | {kept['date']}, `{kept['commit']}` |"
-        for part, kept in _kept(folder).items()
-        if part in PARTS
-    ]
+    """Table of what was kept of the parts, in Markdown."""
+    rows: dict[str, list[PartResult]] = {}
+    for part, kept in _kept(folder).items():
+        rows.setdefault(part.partition(",")[0], []).append(kept)
     head = "| part | passed | failed | skipped | not run | s | date, commit |"
-    return "\n".join([head, "|---|---|---|---|---|---|---|", *rows, ""])
+    return "\n".join([head, "|---|---|---|---|---|---|---|", *map(_row, rows, rows.values()), ""])
 
 
 def log_path(folder: Path, part: str) -> Path:
@@ -119,10 +132,21 @@ def read_result(part: str, said: str, took_s: float) -> PartResult:
     )
 
 
-def _kept(folder: Path) -> dict[str, dict[str, object]]:
-    path = folder / "tests.json"
-    kept: dict[str, dict[str, object]] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
-    return {**{part: kept[part] for part in PARTS if part in kept}, **kept}
+def _row(name: str, parts: Sequence[PartResult]) -> str:
+    passed, failed = sum(part.passed for part in parts), sum(len(part.failed) for part in parts)
+    skipped, not_run = sum(part.skipped for part in parts), sum(part.not_run for part in parts)
+    took_s = sum(part.took_s for part in parts)
+    when = ", ".join(dict.fromkeys(f"{part.date} `{part.commit}`" for part in parts))
+    return f"| {name} | {passed:,} | {failed} | {skipped} | {not_run} | {took_s:.0f} | {when} |"
+
+
+def _kept(folder: Path) -> dict[str, PartResult]:
+    """Results of parts of PARTS, in their order."""
+    path = folder / SUMMARY_NAME
+    if not path.exists():
+        return {}
+    kept = msgspec.json.decode(path.read_bytes(), type=dict[str, PartResult])
+    return {part: kept[part] for part in PARTS if part in kept}
 
 
 def _commit() -> str:
