@@ -6,14 +6,18 @@ from tools.windows.environment import PROJECT
 from tools.windows.suite import PARTS, paths_of, read_result
 
 _SAID = """\
-collecting ... collected 9 items / 2 deselected / 7 selected
+3 workers [7 items]
 
-tests/a/test_b.py::test_passes[COM 1] PASSED      [ 10%]
-tests/a/test_b.py::test_fails FAILED              [ 20%]
-tests/a/test_b.py::test_is_skipped SKIPPED (why)  [ 30%]
-tests/a/test_b.py::test_leaves_a_thread PASSED    [ 40%]
-tests/a/test_b.py::test_leaves_a_thread ERROR     [ 40%]
-tests/a/test_b.py::test_hangs +++++ Timeout +++++
+scheduling tests via LoadFileScheduling
+
+tests/a/test_b.py::test_passes[COM 1]
+tests/a/test_c.py::test_fails
+[gw0] [ 14%] PASSED tests/a/test_b.py::test_passes[COM 1]
+[gw2] [ 28%] FAILED tests/a/test_c.py::test_fails
+[gw0] [ 42%] SKIPPED tests/a/test_b.py::test_is_skipped
+[gw1] [ 57%] PASSED tests/a/test_d.py::test_leaves_a_thread
+[gw1] [ 57%] ERROR tests/a/test_d.py::test_leaves_a_thread
+tests/a/test_b.py::test_hangs
 """
 
 
@@ -27,7 +31,7 @@ def test_every_test_file_is_of_one_part() -> None:
 def test_what_ended_is_counted_and_the_rest_was_not_run() -> None:
     found = read_result("drivers", _SAID, 12.0)
     assert (found.passed, found.skipped, found.not_run) == (1, 1, 3)
-    assert found.failed == ("tests/a/test_b.py::test_fails", "tests/a/test_b.py::test_leaves_a_thread")
+    assert found.failed == ("tests/a/test_c.py::test_fails", "tests/a/test_d.py::test_leaves_a_thread")
 
 
 @pytest.mark.parametrize("said", ["", "ImportError"])

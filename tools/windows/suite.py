@@ -48,10 +48,12 @@ PARTS: Mapping[str, Sequence[str]] = {
 """Files and folders of each part, as patterns. What stands before a comma is one line of the table."""
 SUMMARY_NAME = "tests.json"
 _TEST_S = 300.0  # Wine opens files slowly, and some tests open thousands
+_WORKERS = "3"  # most tests wait for processes
 _DASK = "tests/app/runs/batch/test_dask_executor.py"
 """Its cluster does not start under Wine, and the test would wait for it."""
-_ENDED = re.compile(r"(?m)^(tests/\S+?::.*?) (PASSED|FAILED|ERROR|SKIPPED|XFAIL)\b")
-_SELECTED = re.compile(r"collected (\d+) items?(?:.*?/ (\d+) selected)?")
+_OUTCOME = "(PASSED|FAILED|ERROR|SKIPPED|XFAIL)"
+_ENDED = re.compile(rf"(?m)^\[gw\d+\] \[ *\d+%\] {_OUTCOME} (tests/\S+?::.*?) *$")
+_SELECTED = re.compile(r"\[(\d+) items?\]")
 
 
 @dataclass(frozen=True)
@@ -79,9 +81,9 @@ def run_part(environment: WindowsEnvironment, part: str, folder: Path, limit_s: 
     began_s = time.perf_counter()
     try:
         ended = environment.run_python(
-            "-m", "pytest", "-vv", "-m", "not peer and not realtime", "-rfE", "--tb=short", "--timeout",
-            f"{_TEST_S:g}", "--deselect", _DASK, *(path.relative_to(PROJECT).as_posix() for path in paths),
-            timeout_s=limit_s,
+            "-m", "pytest", "-vv", "-m", "not peer and not realtime", "-rfE", "--tb=short",
+            "--timeout", f"{_TEST_S:g}", "-n", _WORKERS, "--dist", "loadfile", "--deselect", _DASK,
+            *(path.relative_to(PROJECT).as_posix() for path in paths), timeout_s=limit_s,
         )  # fmt: skip
         said = ended.stdout + ended.stderr
     except subprocess.TimeoutExpired as error:
@@ -115,11 +117,11 @@ def log_path(folder: Path, part: str) -> Path:
 
 def read_result(part: str, said: str, took_s: float) -> PartResult:
     """Counts of what pytest said, also where it was ended before it counted."""
-    outcomes = dict(_ENDED.findall(said))  # an error when it is torn down follows what it gave
+    outcomes = {test: outcome for outcome, test in _ENDED.findall(said)}  # an error of its end comes last
     failed = tuple(test for test, outcome in outcomes.items() if outcome in {"FAILED", "ERROR"})
     passed = sum(outcome in {"PASSED", "XFAIL"} for outcome in outcomes.values())
     counted = _SELECTED.search(said)
-    selected = int(counted[2] or counted[1]) if counted else 0
+    selected = int(counted[1]) if counted else 0
     return PartResult(
         part=part,
         date=f"{datetime.now(UTC):%Y-%m-%d}",
