@@ -75,12 +75,12 @@ def _run_if_child(arguments: list[str]) -> list[str]:
     """Run what a parent of the same frozen build asks for, and exit; else return the arguments."""
     import multiprocessing
 
-    from app.child_process import CHILD_OPTION, run_child
+    from app.child import run_child
+    from app.child_process import CHILD_OPTION
 
     multiprocessing.freeze_support()
     if arguments[:1] == [CHILD_OPTION]:
         run_child(*arguments[1:])
-        sys.exit()
     return arguments
 
 

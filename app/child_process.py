@@ -13,7 +13,6 @@ import json
 import logging
 import os
 import queue
-import runpy
 import signal
 import subprocess
 import sys
@@ -31,7 +30,7 @@ Event = TypeVar("Event")
 Decoded = TypeVar("Decoded")
 
 CHILD_OPTION = "--run-child"
-"""First argument of a frozen build that runs a module instead of the command line."""
+"""First argument of a frozen build that runs `main` of a module instead of the command line."""
 READ_BYTES = 1 << 16  # of one read: what a pipe holds on Linux
 
 START_S = 60.0
@@ -83,19 +82,13 @@ def child_command(module: str, *arguments: str) -> list[str]:
     """Command that runs a module of the program in a process of its own."""
     if getattr(sys, "frozen", False):  # its executable is not Python
         return [sys.executable, CHILD_OPTION, module, *arguments]
-    return [sys.executable, "-P", "-m", module, *arguments]
-
-
-def run_child(module: str, *arguments: str) -> None:
-    """Run a module in this process as `child_command` asks a frozen build to."""
-    sys.argv = [module, *arguments]
-    runpy.run_module(module, run_name="__main__", alter_sys=True)
+    return [sys.executable, "-P", "-m", "app.child", module, *arguments]
 
 
 def spawn(
     module: str, *arguments: str, is_background: bool = False, discard_stderr: bool = False
 ) -> "subprocess.Popen[bytes]":
-    """Start `python -m module` with pipes; less priority in the background. Raises OSError."""
+    """Start `main` of a module in a process with pipes; less priority in the background. Raises OSError."""
     flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)  # Windows opens a console window otherwise
     if is_background:
         flags |= getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)

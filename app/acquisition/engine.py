@@ -1,4 +1,4 @@
-"""The acquisition engine: a process of its own, `python -m app.acquisition.engine`, see `EngineClient`.
+"""The acquisition engine, which runs in a process of its own: see `EngineClient`.
 
 Commands come in on stdin and events go out on stdout, one JSON document per line (`messages.py`). When stdin
 ends, the owner is gone: a run that needs nobody goes on to its end, any other is ended. Either way it is
@@ -116,6 +116,7 @@ class Engine:
             str(ring.path), lambda first: stream.time_base(first, self._history.next_index, recent=True)
         )
         self._recording: Recording | None = None
+        self._is_live_prepared = False
         self._arming: Arming | None = None
         self._sequence = run_setup.RunSequence()
         self._last_slip: ObservedSlip | None = None
@@ -287,7 +288,7 @@ class Engine:
         self._recording = Recording(run, metadata, self._rate_hz, journal, context, self._last_slip)
         _log.info("armed: series %s, trigger %s, journal %s", run.series, run.trigger, journal.path)
         self._sleep_prevention.begin()
-        self._live.prepare()
+        self._is_live_prepared = False
         if self._stream.note:
             self._recording.add_note(as_message(self._stream.note))
         if note:
@@ -345,6 +346,9 @@ class Engine:
         leave_note(run)
 
     def _follow_live(self, recording: Recording) -> None:
+        if not self._is_live_prepared and recording.expects_release:
+            self._is_live_prepared = True
+            self._live.prepare()
         now_s = self._history.next_index / self._rate_hz
         result = self._live.poll(recording.confirmed_start_index, recording.metadata, now_s)
         if result is not None:
@@ -455,7 +459,3 @@ def main() -> int:
     finally:
         events.close()
     return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

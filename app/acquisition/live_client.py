@@ -1,4 +1,4 @@
-"""The live identification: the engine's client, and its process `python -m app.acquisition.live_client`.
+"""The live identification: the engine's client, and what runs in its process.
 
 It computes apart from the engine, so that neither compiled code nor a held interpreter lock can delay a read
 of the port. What computes is imported when the pipes are open and the priority is lowered, since that takes
@@ -70,7 +70,7 @@ class LiveIdentifier:
         self._timed_s = 0.0
 
     def prepare(self) -> None:
-        """Start the process while the table is pulled back, unless it runs."""
+        """Start the process, best before the release, unless it runs."""
         if self._child is not None and self._child.has_ended:
             self.stop()
         if self._child is None:
@@ -135,7 +135,3 @@ def main() -> None:
     follower = importlib.import_module("app.acquisition.live_follower")
     follower.warm_up()
     follower.serve(commands, events)
-
-
-if __name__ == "__main__":
-    main()

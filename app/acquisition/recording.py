@@ -120,6 +120,11 @@ class Recording:
         return Latency.BATCHED if self._settings.trigger == "none" else Latency.INTERACTIVE
 
     @property
+    def expects_release(self) -> bool:
+        """Tell whether a release may come soon; without a trigger, since the table has moved."""
+        return self._settings.trigger != "none" or not self._trigger.is_table_at_rest
+
+    @property
     def ends_s(self) -> float:
         """Time until the samples of the run are complete; infinite where only a motion ends it."""
         end = self._trigger.end

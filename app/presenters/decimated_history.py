@@ -33,7 +33,9 @@ class Polyline:
 
     def strokes(self, height: float) -> float:
         """Length of the line in heights of the plot."""
-        return float(np.nansum(np.abs(np.diff(self.value)))) / height
+        strokes = np.abs(np.diff(self.value))
+        length = strokes.sum()
+        return float(np.nansum(strokes) if np.isnan(length) else length) / height
 
 
 _Spans = tuple[NDArray[np.float64], NDArray[np.float32], NDArray[np.float32]]

@@ -1,4 +1,4 @@
-"""Validate files, which may crash or hang HDF5, in a child process: `python -m app.runs.validator`."""
+"""Validate files, which may crash or hang HDF5, in a child process."""
 
 import atexit
 import contextlib
@@ -195,7 +195,3 @@ def _validate(path: str) -> ValidationReply:
         if is_in_use(error, Path(path)):
             return ValidationReply(fault="in-use", message=errors.in_use(path).message)
         return ValidationReply(fault="damaged", message=errors.damaged(path, error).message)
-
-
-if __name__ == "__main__":
-    main()

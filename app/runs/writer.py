@@ -1,6 +1,6 @@
 """Write run files while they are recorded, so that a crash at any moment leaves them readable.
 
-The writer is a process of its own, `python -m app.runs.writer`: HDF5 can crash the process that it runs in,
+The writer is a process of its own: HDF5 can crash the process that it runs in,
 above all at the close after a full disk, and the engine and its journal must survive.
 """
 
@@ -16,6 +16,7 @@ from typing import NoReturn
 import h5py
 import msgspec
 import numpy as np
+from isal import isal_zlib
 from numpy.typing import NDArray
 
 from app.child_process import CommandReader, EventSender, ignore_session_signals, reserve_stdout
@@ -267,6 +268,8 @@ class RunWriter:
 
 _BATCH_BYTES = 1 << 20
 """Bytes copied at once, whatever the length of a run."""
+_PACKING_LEVEL = 1
+"""Of ISA-L, 0 to 3: lines shrink to 0.40; to 0.50 at 0, in as long; to 0.37 at 3, in 1.3 times as long."""
 
 
 def _append_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
@@ -292,16 +295,14 @@ def _append_raw_bytes(file: h5py.File, journal: JournalSpan) -> int:
 def _append_chunks(dataset: h5py.Dataset, data: bytes) -> bytes:
     """Append as many whole chunks of a compressed dataset as `data` fill; returns the rest.
 
-    The dataset ends at a border of chunks. The bytes of devices are noise for the most part, so repeated
-    texts are not searched for: the search takes more than half of the time and saves a tenth of the bytes.
+    The dataset ends at a border of chunks. ISA-L takes half the time of zlib's fastest way, for fewer bytes.
     """
     (size,) = dataset.chunks
     first = len(dataset)
     whole = len(data) - len(data) % size
     dataset.resize((first + whole,))
     for start in range(0, whole, size):
-        packer = zlib.compressobj(1, strategy=zlib.Z_HUFFMAN_ONLY)
-        packed = packer.compress(data[start : start + size]) + packer.flush()
+        packed = isal_zlib.compress(data[start : start + size], _PACKING_LEVEL)
         dataset.id.write_direct_chunk((first + start,), packed)
     return data[whole:]
 
@@ -406,7 +407,3 @@ class WriterServer:
         writer, self._writer = self._writer, None
         if writer and writer.usable:
             writer.interrupt(ended, message)
-
-
-if __name__ == "__main__":
-    main()

@@ -84,8 +84,8 @@ class FrameEncoder:
             return _frame(_OPEN, msgspec.json.encode(command))
         if isinstance(command, EndMetadata):
             return _frame(_CLOSE, msgspec.json.encode(command))
-        columns = command.columns(self._layout)
-        return _frame(_APPEND, _ROWS.pack(len(command)) + b"".join(column.tobytes() for column in columns))
+        columns = (column.view(np.uint8).data for column in command.columns(self._layout))
+        return _frame(_APPEND, _ROWS.pack(len(command)), *columns)
 
 
 class FrameDecoder:
@@ -121,8 +121,8 @@ class FrameDecoder:
         raise ValueError(f"frame of unknown kind {kind}")
 
 
-def _frame(kind: int, payload: bytes) -> bytes:
-    return _FRAME.pack(kind, len(payload)) + payload
+def _frame(kind: int, *payload: bytes | memoryview) -> bytes:
+    return b"".join((_FRAME.pack(kind, sum(map(len, payload))), *payload))
 
 
 def _unpack_block(payload: bytes, layout: BlockLayout) -> RunBlock:

@@ -73,7 +73,7 @@ class SimulatedStand:
 
     @classmethod
     def start(cls, options: SimulatedStandOptions) -> Self:
-        return cls(spawn("app.simulated_stand", msgspec.json.encode(options).decode()))
+        return cls(spawn("app.simulated_stand.process", msgspec.json.encode(options).decode()))
 
     @property
     def port(self) -> str:

@@ -75,7 +75,7 @@ def serve(
 
 
 def main() -> int:
-    """Run as `python -m app.simulated_stand OPTIONS`, for `SimulatedStand`."""
+    """Be the device of a `SimulatedStand`, whose options are the argument, as JSON."""
     start_log("simulated-stand")
     ignore_session_signals()
     has_ended = threading.Event()

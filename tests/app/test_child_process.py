@@ -190,7 +190,7 @@ def test_what_else_reads_stdin_finds_its_end_and_takes_no_command():
         "app.runs.exchange.reading_process",
         "app.runs.validator",
         "app.runs.writer",
-        "app.simulated_stand",
+        "app.simulated_stand.process",
     ],
 )
 def test_no_child_reads_the_stdin_that_libraries_see(module):

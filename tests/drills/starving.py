@@ -17,7 +17,7 @@ ROLES = {
     "engine": "app.acquisition.engine",
     "writer": "app.runs.writer",
     "live": "app.acquisition.live_client",
-    "stand": "app.simulated_stand",
+    "stand": "app.simulated_stand.process",
 }
 """Modules that processes run as, by what they are called here."""
 

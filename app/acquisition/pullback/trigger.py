@@ -82,7 +82,12 @@ class Trigger:
     @property
     def is_at_rest(self) -> bool:
         """Tell whether nothing has happened yet that would be worth keeping."""
-        return not self._is_untriggered and self._test.is_at_rest
+        return not self._is_untriggered and self.is_table_at_rest
+
+    @property
+    def is_table_at_rest(self) -> bool:
+        """Tell whether the table has not been pulled back yet, nor released."""
+        return self._test.is_at_rest
 
     def add_samples(self, rows: CalibratedBlock) -> list[Transition]:
         """Take the samples that come next, from arming on; return the new states. The last one sets `end`."""

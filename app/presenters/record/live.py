@@ -89,7 +89,8 @@ class LiveTraces:
     @property
     def is_settled(self) -> bool:
         """Tell whether new samples change nothing that is drawn."""
-        return self.earlier is not None or (self.end_s is not None and self.samples.end_s >= self.end_s)
+        has_ended = self.end_s is not None and self.samples.end_s >= self.end_s
+        return self.earlier is not None or (has_ended and self.traces.span == self._time_axis()[1])
 
     def newest_m(self) -> Floats:
         """Mean of both gauges (2,) over the last `_MEAN_S`, as the gauges read; NaN without samples."""
@@ -251,7 +252,9 @@ class LiveTraces:
             return 0.0, (-ROLLING_S, 0.0)
         if self.release_s is None:
             return now_s, (-ROLLING_S, 0.0)
-        return self.release_s, (-BEFORE_RELEASE_S, _step_up(now_s - self.release_s, _SPANS_S))
+        since_s = now_s - self.release_s
+        last_s = _step_up(since_s, _SPANS_S) if self.end_s is None else since_s
+        return self.release_s, (-BEFORE_RELEASE_S, last_s)
 
     def _side(self, pullback_m: float) -> int:
         """Side of the pull; as before until the table is far enough on one."""

@@ -109,9 +109,9 @@ def _columns(
 
     `x` has the edges of the spans. Where values are absent both rows are 0.
     """
-    first = np.searchsorted(x, columns, side="right") - 1
-    end = np.searchsorted(x, columns + 1.0).clip(max=len(highest))
-    spans = np.column_stack((first.clip(0), end)).ravel()
+    begun = np.searchsorted(x, np.append(columns, columns[-1] + 1.0))  # before each edge of a column
+    first = begun[:-1] - (x[begun[:-1]] != columns)
+    spans = np.column_stack((first, begun[1:])).clip(0, len(highest)).ravel()
     top = np.fmin.reduceat(np.append(highest, np.nan), spans)[::2]
     bottom = np.fmax.reduceat(np.append(lowest, np.nan), spans)[::2]
     own_top = top.copy()

@@ -61,7 +61,9 @@ class Curve(pg.PlotCurveItem):  # type: ignore[misc]  # pyqtgraph has no types
 
     def show_polyline(self, line: Polyline) -> None:
         """Draw a line; one of lowest and highest values as a band, where strokes could not be told apart."""
-        is_dense = self._is_dense(line)
+        self._show(line, is_dense=self._is_dense(line))
+
+    def _show(self, line: Polyline, *, is_dense: bool) -> None:
         self._polyline, self._is_band = line, is_dense and line.is_min_max
         if self._is_band:
             self._band.show_line(line)
@@ -129,9 +131,9 @@ class Line(Curve):
             self.show_polyline(self._line.part(*part, pixels))
             return
         line = self._line.thinned(*part, pixels)
-        self.show_polyline(
-            _edges(self._line.part(*part, pixels // _EDGE_PX)) if self._is_dense(line) else line
-        )
+        if self._is_dense(line):
+            line = _edges(self._line.part(*part, pixels // _EDGE_PX))
+        self._show(line, is_dense=False)
 
 
 def _edges(line: Polyline) -> Polyline:

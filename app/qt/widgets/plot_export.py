@@ -83,19 +83,15 @@ def _draw(shown: QWidget, device: QIODevice) -> None:
 @contextmanager
 def _without_pictures(shown: QWidget) -> Iterator[None]:
     """Let the items of plots be drawn themselves, not the pictures of them that Qt keeps."""
-    views = shown.findChildren(QGraphicsView)
-    kept = [(item, item.cacheMode()) for view in views for item in view.items()]
-    for item, _ in kept:
+    items = [item for view in shown.findChildren(QGraphicsView) for item in view.items()]
+    kept = [(item, item.cacheMode()) for item in items]
+    for item in items:
         item.setCacheMode(QGraphicsItem.CacheMode.NoCache)
-    for view in views:
-        view.setCacheMode(QGraphicsView.CacheModeFlag.CacheNone)
     try:
         yield
     finally:
         for item, mode in kept:
             item.setCacheMode(mode)
-        for view in views:
-            view.setCacheMode(QGraphicsView.CacheModeFlag.CacheBackground)
 
 
 def _save(

@@ -17,7 +17,7 @@ from PySide6.QtGui import (
     QPixmapCache,
     QResizeEvent,
 )
-from PySide6.QtWidgets import QFrame, QGraphicsItem, QWidget
+from PySide6.QtWidgets import QFrame, QGraphicsItem, QGraphicsView, QWidget
 
 from analysis.formatting import typeset, with_unit
 from app.presenters.curve_table import TableCurve
@@ -165,6 +165,8 @@ class PlotStack(QFrame):
         self.table: Callable[[], list[TableCurve]] = self.curves_in_view
         """What is saved as a table."""
         self._canvas = pg.GraphicsLayoutWidget()
+        # A background of one colour is filled faster than its picture is copied.
+        self._canvas.setCacheMode(QGraphicsView.CacheModeFlag.CacheNone)
         for part in (self._canvas, self._canvas.viewport()):
             part.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are for the whole plot
         self.plots = [Plot(self._canvas, row) for row in range(len(titles))]

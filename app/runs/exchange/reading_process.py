@@ -1,4 +1,4 @@
-"""Read foreign files in a child process with limits: `python -m app.runs.exchange.reading_process`.
+"""Read foreign files in a child process with limits.
 
 A file of another program may be damaged or made to harm: its reader may crash, hang or take all memory.
 """
@@ -282,7 +282,3 @@ def _unpacked_value(value: Value) -> Value:
     if value.template == _FLOAT:
         return float(str(value.values["text"]))
     return Option(str(value.values["name"])) if value.template == _OPTION else _unpacked(value)
-
-
-if __name__ == "__main__":
-    main()

@@ -11,6 +11,7 @@ from engine_kit import connect, port_of, run_in, stand, until
 
 from app.acquisition.live_client import DIED_NOTE
 from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged, Stop
+from messages.message import EMPTY
 from tests.drills.processes import children_of, gone
 from tests.waiting import PATIENCE_S, wait_until
 
@@ -41,6 +42,14 @@ def test_friction_is_told_while_the_motion_dies_away(tmp_path):
     assert last is not None
     assert last.value == pytest.approx(0.1, abs=4.0 * last.standard_uncertainty)
     assert not any(result.message for result in results)
+
+
+def test_a_run_without_trigger_is_identified_too(tmp_path):
+    with stand(hold_s=5.0) as simulated, connect(port_of(simulated)) as engine:
+        engine.send(Arm(run_in(tmp_path, trigger="none", duration_s=None)))
+        assert until(engine, LiveResult).message == EMPTY
+        engine.send(Stop())
+        until(engine, RunEnded)
 
 
 def test_a_run_goes_on_without_it_and_says_so(tmp_path):

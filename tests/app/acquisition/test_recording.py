@@ -239,6 +239,17 @@ def test_a_run_in_which_nothing_happened_leaves_no_file_where_none_is_wanted(tmp
     assert again.ended().samples > 0, "the table was pulled back: that is kept"
 
 
+@pytest.mark.parametrize("trigger", ["pullback", "none"])
+def test_without_trigger_a_release_is_expected_once_the_table_moves(tmp_path, trigger):
+    bench = Bench(tmp_path, RunSettings(str(tmp_path), series="1FFM0", trigger=trigger, duration_s=9.0))
+    bench.play(round(0.9 * TIMETABLE.rest_s * RATE_HZ))
+    assert bench.recording.expects_release is (trigger == "pullback")
+    bench.play(RELEASED - 50)
+    assert bench.recording.expects_release
+    bench.recording.end(EndReason.STOPPED)
+    bench.ended()
+
+
 def test_metadata_begin_with_the_first_stored_sample(tmp_path):
     bench = Bench(tmp_path)
     bench.play(RELEASED + 200)

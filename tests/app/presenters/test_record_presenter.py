@@ -226,8 +226,9 @@ def test_after_the_end_the_traces_stand_and_the_result_is_awaited(
     presenter: RecordPresenter, recorder: FakeRecorder
 ) -> None:
     finish(presenter, recorder)
-    frozen = presenter.state.traces
     feed(presenter, recorder, END_S, END_S + 3.0)
+    frozen = presenter.state.traces
+    assert frozen.span == (-1.0, pytest.approx(END_S - RELEASED_S)), "to the end of the record"
     assert presenter.state.traces.table.time_s[-1] <= END_S - RELEASED_S
     feed(presenter, recorder, END_S + 3.0, END_S + 4.0)
     assert presenter.state.traces.span == frozen.span
