@@ -102,7 +102,7 @@ class FakeEngine:
     Rests until armed; then the made-up pullback goes by.
     """
 
-    def __init__(self, directory: Path | str = "/recordings") -> None:
+    def __init__(self, directory: Path | str = FOLDER) -> None:
         self.commands: list[Command] = []
         self.closed = False
         self._directory = directory
@@ -275,7 +275,7 @@ class FakeSimulation:
 class FakeLauncher:
     """Starts fakes, at once."""
 
-    def __init__(self, directory: Path | str = "/recordings", error: Exception | None = None) -> None:
+    def __init__(self, directory: Path | str = FOLDER, error: Exception | None = None) -> None:
         self.engines: list[FakeEngine] = []
         self.simulations: list[FakeSimulation] = []
         self.ports: list[PortSettings] = []
