@@ -117,3 +117,18 @@ def real_stand_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
             path = Path(write_test(test).path)
             analyze_run(path, AnalysisRequest(classical=False), save=True, trusted=True)
     return folder
+
+
+@pytest.fixture
+def symbolic_links(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Skip where links cannot be made, as by most accounts of Windows, or are not followed, as under Wine."""
+    target = tmp_path_factory.mktemp("links") / "target"
+    target.write_text("there")
+    link = target.with_name("link")
+    try:
+        link.symlink_to(target.name)
+        is_followed = link.read_text() == "there"
+    except OSError:
+        is_followed = False
+    if not is_followed:
+        pytest.skip("no symbolic links here")
