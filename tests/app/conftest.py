@@ -59,9 +59,10 @@ def cache_folder(tmp_path_factory, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def data_folder(tmp_path_factory, monkeypatch):
-    """A data folder of the test's own on Linux, for the processes that it starts too."""
+    """A data folder of the test's own on Linux and Windows, for the processes that it starts too."""
     place = tmp_path_factory.mktemp("data")
-    monkeypatch.setenv("XDG_DATA_HOME", str(place))
+    for name in ("XDG_DATA_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):  # the latter is platformdirs' own
+        monkeypatch.setenv(name, str(place))
     return place
 
 
