@@ -1,8 +1,9 @@
 """Many runs: `python benchmarks/campaign.py` prints the tables of docs/benchmarks.md.
 
-Runs a second of one process, of two, and of a Dask cluster of two workers on loopback, each from its start to
-its end; what a second pass takes, which finds everything up to date; memory over thousands of runs, by copies
-of short ones; and a campaign of 108 runs from files to the PDF of its report.
+Runs a second of one process that has loaded the analysis, of two that load it, and of a Dask cluster of two
+workers on loopback, each from its start to its end; the command with one and two processes; what a second
+pass takes, which finds everything up to date; memory over thousands of runs, by copies of short ones; and a
+campaign of 108 runs from files to the PDF of its report.
 """
 
 import argparse
@@ -37,11 +38,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=108, help="of Table 1, for the rates (%(default)s)")
     parser.add_argument("--many", type=int, default=10_000, help="for the memory (%(default)s)")
-    parser.add_argument("--only", choices=("rates", "memory", "report"), help="one table alone")
+    parser.add_argument("--only", choices=("rates", "command", "memory", "report"), help="one table alone")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as place:
         if options.only in (None, "rates"):
             rates(Path(place) / "rates", options.runs)
+        if options.only in (None, "command"):
+            command(Path(place) / "command")
         if options.only in (None, "memory"):
             memory(Path(place) / "many", options.many)
         if options.only in (None, "report"):
@@ -84,6 +87,21 @@ def pass_of(paths: list[Path], *, save: bool) -> float:
     if gathered.failures:
         raise SystemExit(gathered.failures[0].error)
     return time.perf_counter() - began
+
+
+def command(folder: Path) -> None:
+    """The same by the command line, with all methods, from the start of the command to its end."""
+    campaign(folder)
+    print("| `slipstand analyze`, 108 runs | s | against one process |")
+    print("|---|---|---|")
+    took = []
+    for jobs in (1, 2):
+        command = [sys.executable, "-m", "app", "analyze", str(folder), "--jobs", str(jobs), "--json"]
+        began = time.perf_counter()
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+        took.append(time.perf_counter() - began)
+        print(f"| processes: {jobs} | {took[-1]:.1f} | {took[0] / took[-1]:.2f} x |")
+    print()
 
 
 def memory(folder: Path, count: int) -> None:

@@ -3,9 +3,12 @@
 On Linux the process that forks workers imports it before them, so that it is loaded once for all.
 """
 
-from analysis.identify import warm_up
-from app.runs.batch import tasks
+from app.child import loading
 
 __all__ = ["tasks"]
 
-warm_up()
+with loading():
+    from analysis.identify import warm_up
+    from app.runs.batch import tasks
+
+    warm_up()
