@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
 from typing import Final
 
 import numpy as np
@@ -11,6 +10,7 @@ from scipy.signal import detrend, welch
 
 from analysis.arrays import Floats
 from analysis.formatting import format_length, format_number
+from analysis.health_grade import HealthGrade
 from analysis.preparation.channels import MAINS_HZ
 from analysis.record import AnalysisError
 from messages.message import Message, message
@@ -207,14 +207,6 @@ _REPEATED: Final = 0.25  # white noise over 20 steps or more repeats a reading i
 _OSCILLATION_M: Final = 10e-6  # the table moves; below, the line is counted as noise
 _DRIFT_SIGMAS: Final = 4.0  # chance lets one gauge in some thousands drift by so many standard uncertainties
 _QUIET: Final = 1e-7  # noise below this fraction of the range is less than the last of 24 bits
-
-
-class HealthGrade(StrEnum):
-    """Condition of a gauge, from good to bad."""
-
-    GOOD = "good"
-    DOUBTFUL = "doubtful"
-    BAD = "bad"
 
 
 @dataclass(frozen=True, slots=True)

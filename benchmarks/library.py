@@ -21,8 +21,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from analysis.motion.two_mass import TwoMassParameters
 from app.runs.decimation import open_decimated
-from app.runs.listing import RunFilter, list_runs
+from app.runs.listing import list_runs
 from app.runs.reader import open_run
+from app.runs.run_filter import RunFilter
 from app.runs.simulated import write_simulated_run
 from app.runs.validator import Validator
 

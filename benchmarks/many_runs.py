@@ -30,7 +30,8 @@ from app.runs import listing
 from app.runs.analysis_request import AnalysisRequest
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
-from app.runs.listing import RunFilter, list_runs
+from app.runs.listing import list_runs
+from app.runs.run_filter import RunFilter
 from app.runs.simulated import write_simulated_run
 
 REPEATS = 3

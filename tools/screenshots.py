@@ -20,12 +20,12 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtGui import QCursor
 from PySide6.QtWidgets import QApplication, QDialog
 
-from analysis.gauge_health import HealthGrade
+from analysis.health_grade import HealthGrade
 from analysis.laws.stand_parts import stand_displacements
 from analysis.synthetic import Truth, simulate_readings
 from app.presenters.base import Tone
 from app.presenters.composition import make_window_presenter
-from app.presenters.gauge_health import GaugeHealthState
+from app.presenters.gauge_health_state import GaugeHealthState
 from app.presenters.gauges.state import GaugesTab
 from app.presenters.identify.state import PlotTab as IdentifySide
 from app.presenters.record.state import Action, PlanEdited, RunForm, StepStatus

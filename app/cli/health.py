@@ -4,13 +4,15 @@ from typing import Any
 
 import typer
 
-from analysis.gauge_health import GaugeHealth, HealthGrade, measure_health
+from analysis.gauge_health import GaugeHealth, measure_health
+from analysis.health_grade import HealthGrade
 from app.acquisition.gauge_samples import collect_samples
 from app.cli import output as out
 from app.cli.calibrate import open_gauges
 from app.cli.device_options import HealthOptions
 from app.cli.option_values import calibration_file, device_settings, figure_file
-from app.presenters.gauge_health import GAUGE_NAMES, GaugeHealthState, gauge_health_state
+from app.presenters.gauge_health import GAUGE_NAMES, gauge_health_state
+from app.presenters.gauge_health_state import GaugeHealthState
 from config.files import load_gauges
 
 

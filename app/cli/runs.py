@@ -14,8 +14,9 @@ from app.cli.errors import CommandError, alternatives
 from app.cli.recover import print_unfinished_runs
 from app.cli.run_file_options import RUN_COLUMNS, ListRunsOptions, TrashOptions
 from app.runs.file_operations import list_trash, move_to_trash, restore_from_trash
-from app.runs.listing import RunFilter, list_runs
+from app.runs.listing import list_runs
 from app.runs.paths import recordings_directory
+from app.runs.run_filter import RunFilter
 from app.runs.summary import RunSummary
 from config.files import load_stand
 

@@ -1,14 +1,12 @@
 """Health of gauges as texts and figures, for the window and the command line."""
 
-from dataclasses import dataclass
 from typing import Final
-
-import numpy as np
 
 from analysis.catalogue import MICROMETRE
 from analysis.formatting import MINUS, format_value, with_unit
-from analysis.gauge_health import GaugeHealth, HealthGrade, Hum, diagnose, worst_grade
+from analysis.gauge_health import GaugeHealth, Hum, diagnose, worst_grade
 from app.presenters.base import LabelledValue
+from app.presenters.gauge_health_state import GaugeHealthState, SymptomText
 from app.presenters.number_text import format_displacement, format_fixed
 from messages.i18n import gettext, translate
 
@@ -17,26 +15,6 @@ GAUGE_NAMES: Final = ("gauge 1 (table)", "gauge 2 (relative)")
 
 def _percent(fraction: float, decimals: int) -> str:
     return with_unit(f"{100.0 * fraction:.{decimals}f}", "%")
-
-
-@dataclass(frozen=True, slots=True)
-class SymptomText:
-    code: str
-    grade: HealthGrade
-    message: str
-    remedy: str
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class GaugeHealthState:
-    name: str
-    verdict: HealthGrade
-    symptoms: tuple[SymptomText, ...]
-    """The worst first."""
-    figures: tuple[LabelledValue, ...]  # the same lines for each gauge
-    frequency_hz: np.ndarray
-    density_um: np.ndarray
-    """Noise spectrum (µm/√Hz)."""
 
 
 def gauge_health_state(name: str, health: GaugeHealth) -> GaugeHealthState:

@@ -1,6 +1,5 @@
 """Theme: colours of both schemes, typeface, palette and style sheet."""
 
-import sys
 from dataclasses import asdict, dataclass
 from enum import Enum
 from pathlib import Path
@@ -80,15 +79,15 @@ class TextRole(Enum):
 def font(role: TextRole) -> QFont:
     """Font of a role. Sizes are px on a screen of 96 dpi and follow the system's scaling of text.
 
-    Widths are those of the typeface: without a configuration of fonts, Linux would round those of letters.
-    Windows fits letters to pixels by itself.
+    Widths are those of the typeface: FreeType would round those of letters without a configuration of fonts,
+    and offscreen on Windows. The windows of Windows fit letters to pixels by themselves.
     """
     size_px, weight = role.value
     made = QFont(FAMILY)
     screen = QGuiApplication.primaryScreen()
     made.setPointSizeF(size_px * 72.0 / (screen.logicalDotsPerInchY() if screen else 96.0))
     made.setVariableAxis(QFont.Tag("wght"), weight)
-    if sys.platform != "win32":
+    if QGuiApplication.platformName() != "windows":
         made.setHintingPreference(QFont.HintingPreference.PreferVerticalHinting)
     return made
 

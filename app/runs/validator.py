@@ -20,7 +20,8 @@ from app import child_process
 from app.child_process import CommandReader, EventSender, RequestProcess
 from app.log import start_log
 from app.runs import errors
-from app.runs.summary import RunSummary, summarize_file
+from app.runs.summarize import summarize_file
+from app.runs.summary import RunSummary
 from app.runs.validation import validate_file
 from config.durable_files import is_in_use
 from messages.i18n import N_

@@ -9,11 +9,11 @@ from analysis.gauge_health import (
     GaugeHealth,
     GaugeHealthError,
     GaugeSamples,
-    HealthGrade,
     diagnose,
     measure_health,
     worst_grade,
 )
+from analysis.health_grade import HealthGrade
 
 RATE_HZ = 1000.0
 RANGE_M = 0.0165

@@ -59,9 +59,10 @@ def cache_folder(tmp_path_factory, monkeypatch):
 
 @pytest.fixture(autouse=True)
 def data_folder(tmp_path_factory, monkeypatch):
-    """A data folder of the test's own on Linux, for the processes that it starts too."""
+    """A data folder of the test's own on Linux and Windows, for the processes that it starts too."""
     place = tmp_path_factory.mktemp("data")
-    monkeypatch.setenv("XDG_DATA_HOME", str(place))
+    for name in ("XDG_DATA_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):  # the latter is platformdirs' own
+        monkeypatch.setenv(name, str(place))
     return place
 
 
@@ -117,3 +118,18 @@ def real_stand_runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
             path = Path(write_test(test).path)
             analyze_run(path, AnalysisRequest(classical=False), save=True, trusted=True)
     return folder
+
+
+@pytest.fixture
+def symbolic_links(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Skip where links cannot be made, as by most accounts of Windows, or are not followed, as under Wine."""
+    target = tmp_path_factory.mktemp("links") / "target"
+    target.write_text("there")
+    link = target.with_name("link")
+    try:
+        link.symlink_to(target.name)
+        is_followed = link.read_text() == "there"
+    except OSError:
+        is_followed = False
+    if not is_followed:
+        pytest.skip("no symbolic links here")

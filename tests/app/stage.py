@@ -42,7 +42,7 @@ from messages.message import message
 
 RATE_HZ = 1000.0
 PULLED_S, HELD_S, RELEASED_S, SLIP_END_S, END_S = 2.0, 4.0, 5.0, 7.5, 15.0
-FOLDER = str(Path("/recordings"))
+FOLDER = str(Path("/recordings").absolute())  # on Windows with a drive
 RUN = str(Path(FOLDER, "20260112_1FFM0_001.h5"))
 
 
@@ -52,7 +52,7 @@ def bench() -> StandContext:
         load_stand(),
         load_gauges(),
         tuple(published_table()),
-        Path("/recordings"),
+        Path(FOLDER),
         today=lambda: datetime.date(2026, 2, 1),
     )
 
@@ -102,7 +102,7 @@ class FakeEngine:
     Rests until armed; then the made-up pullback goes by.
     """
 
-    def __init__(self, directory: Path | str = "/recordings") -> None:
+    def __init__(self, directory: Path | str = FOLDER) -> None:
         self.commands: list[Command] = []
         self.closed = False
         self._directory = directory
@@ -275,7 +275,7 @@ class FakeSimulation:
 class FakeLauncher:
     """Starts fakes, at once."""
 
-    def __init__(self, directory: Path | str = "/recordings", error: Exception | None = None) -> None:
+    def __init__(self, directory: Path | str = FOLDER, error: Exception | None = None) -> None:
         self.engines: list[FakeEngine] = []
         self.simulations: list[FakeSimulation] = []
         self.ports: list[PortSettings] = []

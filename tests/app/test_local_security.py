@@ -85,6 +85,7 @@ def test_a_folder_that_another_user_made_first_is_not_used(tmp_path):
     assert not is_own_folder(trap)
 
 
+@pytest.mark.usefixtures("symbolic_links")
 def test_a_journal_does_not_move_through_a_link(tmp_path):
     elsewhere, trap, good = tmp_path / "elsewhere", tmp_path / "trap", tmp_path / "good"
     elsewhere.mkdir()
@@ -97,6 +98,7 @@ def test_a_journal_does_not_move_through_a_link(tmp_path):
     journal.release()
 
 
+@pytest.mark.usefixtures("symbolic_links")
 def test_a_lock_makes_no_file_elsewhere(tmp_path):
     lock = recording_lock(tmp_path / "run.h5")
     lock.path.symlink_to(tmp_path / "victim")
@@ -105,6 +107,7 @@ def test_a_lock_makes_no_file_elsewhere(tmp_path):
     assert not (tmp_path / "victim").exists()
 
 
+@pytest.mark.usefixtures("symbolic_links")
 def test_an_edit_writes_through_no_link(tmp_path, run_path):
     victim = tmp_path / "victim"
     victim.write_text("kept")

@@ -7,7 +7,7 @@ _PROCESS = """
 import sys
 import app
 import numpy as np
-from drivers.crc import crc16_slice
+from drivers.crc_slice import crc16_slice
 crc16_slice(np.zeros(4, np.uint8), 0, 4)
 assert "numba" in sys.modules and "scipy.linalg" not in sys.modules
 import scipy.linalg

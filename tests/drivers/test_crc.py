@@ -2,7 +2,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.crc import crc16, crc16_slice
+from drivers.crc import crc16
+from drivers.crc_slice import crc16_slice
 
 
 def bitwise_crc16(data: bytes) -> int:

@@ -27,6 +27,17 @@ def test_neither_engine_nor_the_start_of_the_window_loads_h5py(module: str) -> N
     assert not loaded_after(f"import {module}") & {"h5py", "matplotlib", *QT}
 
 
+@pytest.mark.parametrize("module", ["drivers.port", "app.runs.run_filter"])
+def test_ports_are_listed_and_runs_are_told_of_without_them_too(module: str) -> None:
+    assert not loaded_after(f"import {module}") & {"numba", "scipy", "h5py", "matplotlib"}
+
+
+@pytest.mark.parametrize("screen", ["campaign", "gauges", "identify", "record", "runs"])
+def test_a_screen_opens_without_the_libraries_of_analysis(screen: str) -> None:
+    """Its modules are loaded in the window's thread, which stands still for as long."""
+    assert not loaded_after(f"import app.qt.{screen}.screen") & {"numba", "scipy", "h5py", "matplotlib"}
+
+
 @pytest.mark.parametrize(
     "arguments", [["--version"], ["--help"], ["simulate", "--series", "1FFM0", "--json"], ["device", "list"]]
 )

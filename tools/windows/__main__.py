@@ -12,7 +12,7 @@ from pathlib import Path
 
 import platformdirs
 
-from tools.windows import checks
+from tools.windows import checks, suite
 from tools.windows.checks import Check
 from tools.windows.environment import EnvironmentMissingError, WindowsEnvironment
 
@@ -26,14 +26,18 @@ def main() -> int:
         "port": lambda: checks.record_from_ports(environment),
         "kill": lambda: checks.kill(environment),
         "window": lambda: checks.window(environment, arguments.display, environment.folder / "results"),
-        "tests": lambda: checks.tests(environment, environment.folder / "results", arguments.parts),
+        "tests": lambda: checks.tests(
+            environment, environment.folder / "results", arguments.parts, arguments.seconds
+        ),
     }
     parser = argparse.ArgumentParser(prog="python -m tools.windows", description=__doc__)
     parser.add_argument("steps", nargs="*", metavar="STEP", help=f"some of: {', '.join(steps)}")
     parser.add_argument("--folder", type=Path, default=default_folder(), help="where all is kept")
     parser.add_argument(
-        "--parts", nargs="+", default=checks.TEST_PARTS, metavar="PART", help="files or folders of tests"
-    )
+        "--parts", nargs="+", default=list(suite.PARTS), metavar="PART",
+        help=f"of the tests: {', '.join(suite.PARTS)}; or files and folders",
+    )  # fmt: skip
+    parser.add_argument("--seconds", type=float, default=3600.0, help="that a part of the tests may take")
     parser.add_argument("--display", type=int, default=77, help="number of the display that is made")
     arguments = parser.parse_args()
     if unknown := set(arguments.steps) - set(steps):

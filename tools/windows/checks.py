@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-import re
 import shlex
 import shutil
 import subprocess
@@ -12,21 +11,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from tools.windows import suite
 from tools.windows.environment import PROJECT, WindowsEnvironment
 
 THEMES = ("light", "dark")
-TEST_PARTS = (
-    "tests/config", "tests/messages", "tests/house", "tests/drivers", "tests/app/test_child_process.py",
-    "tests/app/test_log.py", "tests/app/runs", "tests/app/acquisition", "tests/app/simulated_stand",
-    "tests/app/cli", "tests/app/presenters", "tests/app/qt", "tests/app/reports", "tests/analysis",
-)  # fmt: skip
 _RECORDINGS = "/opt/windows/recordings"
 _RECORD_S = 600.0
 _DEMO_S = 900.0  # the first one compiles
-_TESTS_S = 3600.0
-_TEST_S = 600.0  # Wine opens files slowly, and some tests open thousands
-_DASK = "tests/app/runs/batch/test_dask_executor.py"
-"""Its cluster does not start under Wine, and the test would wait for it."""
+_COMPILE_S = 900.0
 _TRUE_FRICTION = 0.1
 _UNPLUGS = tuple(word for second in range(20, 600, 15) for word in ("--fault", f"unplug 2 at {second}"))
 """Of a simulated stand: whatever 25 s of it are recorded, its cable is pulled meanwhile."""
@@ -125,24 +117,18 @@ def window(environment: WindowsEnvironment, display: int, pictures: Path) -> Ite
         yield Check(f"window, {theme}", bool(runs) and len(taken) == 2, figures.strip())
 
 
-def tests(environment: WindowsEnvironment, logs: Path, parts: Sequence[str]) -> Iterator[Check]:
-    """Run the tests by parts. Those in real time that need a pseudo-terminal skip themselves."""
-    logs.mkdir(parents=True, exist_ok=True)
-    environment.run_python("-m", "tools.compile_all", timeout_s=_TESTS_S)
+def tests(
+    environment: WindowsEnvironment, folder: Path, parts: Sequence[str], limit_s: float
+) -> Iterator[Check]:
+    """Run the tests part by part; their counts, and the table of all parts, are kept in a folder."""
+    environment.run_python("-m", "tools.compile_all", timeout_s=_COMPILE_S)
     for part in parts:
-        log = logs / f"{part.replace('/', '-').removesuffix('.py')}.log"
-        try:
-            ended = environment.run_python(
-                "-m", "pytest", "-vv", "-m", "not peer and not realtime", "-rfE", "--tb=short", "--timeout",
-                f"{_TEST_S:g}", "--ignore", _DASK, part, timeout_s=_TESTS_S,
-            )  # fmt: skip
-        except subprocess.TimeoutExpired as error:
-            log.write_bytes(error.output or b"")
-            yield Check(part, False, f"not done after {_TESTS_S:g} s")
-            continue
-        log.write_text(ended.stdout + ended.stderr, encoding="utf-8")
-        counts = re.findall(r"(?m)^=+ (.* in [\d.]+s.*?) =+$", ended.stdout)
-        yield Check(part, ended.returncode == 0, f"{counts[-1] if counts else 'no result'}; {log}")
+        found = suite.run_part(environment, part, folder, limit_s)
+        (folder / "tests.md").write_text(suite.table(folder), encoding="utf-8")
+        counts = f"{found.passed} passed, {len(found.failed)} failed, {found.skipped} skipped"
+        figures = f"{counts}, {found.not_run} not run in {found.took_s:.0f} s; {suite.log_path(folder, part)}"
+        passed = found.passed > 0 and not found.failed and not found.not_run
+        yield Check(part, passed, "\n      ".join([figures, *found.failed]))
 
 
 def _record(environment: WindowsEnvironment, port: str, name: str, *options: str, gap: bool = False) -> Check:

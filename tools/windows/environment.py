@@ -5,6 +5,7 @@ Debian 12's Wine 8 loads neither numpy nor Qt. Mirror and index are those that a
 
 import filecmp
 import hashlib
+import importlib.metadata
 import os
 import re
 import shutil
@@ -94,13 +95,14 @@ class WindowsEnvironment:
         copied = self.inside / "slipstand"
         for name in filter(None, listed.split("\0")):
             source, target = PROJECT / name, copied / name
-            if source.is_file() and not source.is_relative_to(PROJECT / "recordings"):
+            if source.is_file():
                 target.parent.mkdir(parents=True, exist_ok=True)
                 if not (target.is_file() and filecmp.cmp(source, target, shallow=False)):
                     shutil.copy2(source, target)
         for left in copied.rglob("*.py"):  # tests of an earlier copy would be run
             if not (PROJECT / left.relative_to(copied)).exists():
                 left.unlink()
+        self._state_package()
 
     def prepare_builder(self, requirements: Path, wheel: Path, freezer: str) -> str:
         """Make a Python that has the program from its wheel and PyInstaller, and return its path inside."""
@@ -135,6 +137,16 @@ class WindowsEnvironment:
             [*alone, "sh", "-c", _ENTER, str(self.root), *entered],
             timeout=timeout_s, check=False, capture_output=True, text=True, errors="replace",
         )  # fmt: skip
+
+    def _state_package(self) -> None:
+        """Copy what the checkout's installation states of the package, as its version and requirements."""
+        stated = importlib.metadata.distribution("slipstand")
+        for left in (self.inside / "packages").glob("slipstand-*.dist-info"):
+            shutil.rmtree(left)
+        target = self.inside / "packages" / f"slipstand-{stated.version}.dist-info"
+        target.mkdir()
+        for name in ("METADATA", "entry_points.txt"):
+            (target / name).write_text(stated.read_text(name) or "", encoding="utf-8")
 
     def _make(self, name: str, key: str, make: Callable[[], None]) -> None:
         marker, digest = self.folder / f"{name}.made", hashlib.sha256(key.encode()).hexdigest()

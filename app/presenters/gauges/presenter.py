@@ -12,6 +12,7 @@ from app.acquisition.messages import Connected
 from app.acquisition.ring import RingRows
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue, Presenter, TaskFailure, Tone
 from app.presenters.device_status import DeviceStatus
+from app.presenters.gauge_health_state import GaugeHealthState
 from app.presenters.gauges.calibration import CalibrationPresenter
 from app.presenters.gauges.check import CheckPresenter
 from app.presenters.gauges.ports import PortsPresenter
@@ -31,7 +32,6 @@ from config.schema import Gauge, GaugeCheck, GaugeChecks, Gauges
 from messages.i18n import N_, gettext, ngettext, translate
 
 if TYPE_CHECKING:
-    from app.presenters.gauge_health import GaugeHealthState
     from app.presenters.gauges import tasks
 else:
     tasks = LazyModule("app.presenters.gauges.tasks")
@@ -162,7 +162,7 @@ class GaugesPresenter(Presenter[GaugesState]):
             done, failed = partial(self._on_measured, gauges), partial(self._on_measure_failed, gauges)
             self._worker.submit(tasks.measure_gauges, rows, self._rate_hz, gauges, done=done, failed=failed)
 
-    def _on_measured(self, gauges: Gauges, health: "tuple[GaugeHealthState, ...]") -> None:
+    def _on_measured(self, gauges: Gauges, health: tuple[GaugeHealthState, ...]) -> None:
         self._is_measuring = False
         if self._stream_gauges is gauges:
             self._update(health=health)

@@ -2,18 +2,16 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.presenters.base import EMPTY_CHIP, Chip, LabelledValue
+from app.presenters.gauge_health_state import GaugeHealthState
 from app.presenters.navigator import ConnectForm
 from config.schema import FilterKind, GaugeChecks, Gauges
 from messages.i18n import N_
-
-if TYPE_CHECKING:  # its import loads `analysis`, which the window does without until it has started
-    from app.presenters.gauge_health import GaugeHealthState
 
 Floats = NDArray[np.float64]
 NAMES: Final = (N_("Gauge 1, table"), N_("Gauge 2, relative"))
@@ -51,7 +49,7 @@ class GaugesState:
     checks_fault: Chip = EMPTY_CHIP
     tab: GaugesTab = GaugesTab.HEALTH
     device: str = ""
-    health: "tuple[GaugeHealthState, ...]" = ()  # empty while nothing is known
+    health: tuple[GaugeHealthState, ...] = ()  # empty while nothing is known
     health_note: str = ""
     stopped_at: str = ""
     """Time of day of the last sample, if none comes any more; `health` is of then."""

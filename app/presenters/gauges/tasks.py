@@ -18,7 +18,8 @@ from app.acquisition.gauge_check import ReferenceStep
 from app.acquisition.gauge_samples import gauge_samples
 from app.acquisition.ring import RingRows
 from app.presenters.base import LabelledValue
-from app.presenters.gauge_health import GaugeHealthState, gauge_health_state
+from app.presenters.gauge_health import gauge_health_state
+from app.presenters.gauge_health_state import GaugeHealthState
 from app.presenters.gauges.state import (
     NAMES,
     ActiveCalibrations,

@@ -25,12 +25,12 @@ from app.presenters.runs.state import (
 )
 from app.presenters.runs.table import RunList
 from app.presenters.worker import LazyModule, Worker
+from app.runs.summary import RunSummary
 from config.schema import Stand
 from messages.i18n import gettext
 
 if TYPE_CHECKING:
     from app.presenters.runs import tasks
-    from app.runs.summary import RunSummary
 else:
     tasks = LazyModule("app.presenters.runs.tasks")
 
@@ -242,7 +242,7 @@ class RunsPresenter(Presenter[RunsState]):
         if not failure.is_cancelled:
             self._set_message(Chip(sentence(failure.message), Tone.BAD))
 
-    def _on_listed(self, place: tuple[str, bool], runs: "tuple[RunSummary, ...]") -> None:
+    def _on_listed(self, place: tuple[str, bool], runs: tuple[RunSummary, ...]) -> None:
         self._is_listing = False
         self._progress = None
         if place != (self.state.folder, self.state.in_trash):

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analysis.catalogue import definition
 from analysis.quantities import Quantity
@@ -13,11 +13,10 @@ from app.presenters.results import ResultRow, sentence
 from app.presenters.results import make_row as result_row
 from app.presenters.runs.state import Column, MetadataForm, RunFilter, RunRow, StatusFilter
 from app.runs.metadata import RunSource
+from app.runs.run_filter import RunFilter as ListingFilter
+from app.runs.summary import RunSummary
 from messages.i18n import N_, gettext
 from messages.message import Message
-
-if TYPE_CHECKING:
-    from app.runs.summary import RunSummary
 
 _SOURCES = {
     RunSource.REAL: N_("real"),
@@ -46,7 +45,7 @@ class RunList:
         self._by_path: dict[str, RunSummary] = {}
         self._rows: dict[str, tuple[RunSummary, RunRow]] = {}
 
-    def set_runs(self, runs: "Sequence[RunSummary]") -> None:
+    def set_runs(self, runs: Sequence[RunSummary]) -> None:
         self._by_path = {run.path: run for run in runs}
 
     def rows(self, run_filter: RunFilter, by: Column, *, descending: bool) -> tuple[RunRow, ...]:
@@ -65,7 +64,7 @@ class RunList:
     def fault(self, path: str) -> Message:
         return self._by_path[path].fault
 
-    def _row(self, run: "RunSummary") -> RunRow:
+    def _row(self, run: RunSummary) -> RunRow:
         known = self._rows.get(run.path)
         if known is None or known[0] != run:
             known = run, make_row(run)
@@ -74,12 +73,9 @@ class RunList:
 
 
 def select_runs(
-    runs: "Iterable[RunSummary]", run_filter: RunFilter, by: Column, *, descending: bool
-) -> "list[RunSummary]":
+    runs: Iterable[RunSummary], run_filter: RunFilter, by: Column, *, descending: bool
+) -> list[RunSummary]:
     """Runs that match, sorted; those without a value in the column come last in both orders."""
-    # Imported here: it loads h5py, which the window does without until it has started.
-    from app.runs.listing import RunFilter as ListingFilter
-
     condition = ListingFilter(series=run_filter.series or None, text=run_filter.text.strip() or None)
     kept = [run for run in runs if condition.matches(run) and _STATUS_CONDITIONS[run_filter.status](run)]
     keyed = [(_SORT_KEYS[by](run), run) for run in kept]
@@ -88,7 +84,7 @@ def select_runs(
     return [run for _, run in valued] + [run for key, run in keyed if key is None]
 
 
-def make_row(run: "RunSummary") -> RunRow:
+def make_row(run: RunSummary) -> RunRow:
     if run.fault:
         known = {Column.NAME: Path(run.path).name, Column.VERDICT: "■ " + gettext("unreadable")}
         return RunRow(run.path, _cells(known), tone=Tone.BAD, hint=sentence(run.fault))
@@ -119,7 +115,7 @@ def make_row(run: "RunSummary") -> RunRow:
     return RunRow(run.path, _cells(known), results, tone, hint)
 
 
-def metadata_form(runs: "list[RunSummary]") -> MetadataForm | None:
+def metadata_form(runs: list[RunSummary]) -> MetadataForm | None:
     """Editable metadata of runs; None if none of them can be read."""
     readable = [run for run in runs if not run.fault]
     if not readable:
@@ -141,7 +137,7 @@ def _cells(known: dict[Column, str]) -> tuple[str, ...]:
     return tuple(known.get(column, "") for column in Column)
 
 
-def _verdict(run: "RunSummary") -> tuple[str, Tone, str]:
+def _verdict(run: RunSummary) -> tuple[str, Tone, str]:
     if not run.analyses:
         hint = gettext("Select it and press R to identify it and keep the result.")
         return gettext("not analysed"), Tone.PLAIN, hint
@@ -157,7 +153,7 @@ def _verdict(run: "RunSummary") -> tuple[str, Tone, str]:
     return "■ " + gettext("does not fit"), Tone.BAD, ""
 
 
-def _results(run: "RunSummary") -> dict[Column, ResultRow]:
+def _results(run: RunSummary) -> dict[Column, ResultRow]:
     """Quantities of the newest saved analysis."""
     stored = {
         Column.FRICTION: ("friction_dynamic", run.friction_dynamic, run.friction_dynamic_uncertainty),
@@ -172,14 +168,14 @@ def _results(run: "RunSummary") -> dict[Column, ResultRow]:
     }
 
 
-def _short_name(run: "RunSummary") -> str:
+def _short_name(run: RunSummary) -> str:
     """Number of a run whose file is named by time and series, which stand beside it; else the file's name."""
     stem = Path(run.path).stem
     named = _USUAL_NAME.fullmatch(stem)
     return named["number"] if named and (named["series"] or "") == (run.series or "") else stem
 
 
-_STATUS_CONDITIONS: "dict[StatusFilter, Callable[[RunSummary], bool]]" = {
+_STATUS_CONDITIONS: dict[StatusFilter, Callable[[RunSummary], bool]] = {
     StatusFilter.ALL: lambda _: True,
     StatusFilter.STALE: lambda run: run.stale,
     StatusFilter.NOT_ANALYSED: lambda run: not run.fault and not run.analyses,
@@ -188,7 +184,7 @@ _STATUS_CONDITIONS: "dict[StatusFilter, Callable[[RunSummary], bool]]" = {
 }
 
 
-_SORT_KEYS: "dict[Column, Callable[[RunSummary], Any]]" = {
+_SORT_KEYS: dict[Column, Callable[[RunSummary], Any]] = {
     Column.NAME: lambda run: (_short_name(run).casefold(), Path(run.path).name.casefold()),
     Column.FILE: lambda run: Path(run.path).name.casefold(),
     Column.DATE: lambda run: run.start_time,

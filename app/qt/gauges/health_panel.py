@@ -8,10 +8,10 @@ import numpy as np
 from PySide6.QtWidgets import QStackedWidget, QWidget
 
 from analysis.formatting import typeset, with_unit
-from analysis.gauge_health import HealthGrade
+from analysis.health_grade import HealthGrade
 from app.presenters.base import EMPTY_CHIP, Chip, Tone
 from app.presenters.curve_table import TableCurve
-from app.presenters.gauge_health import GaugeHealthState
+from app.presenters.gauge_health_state import GaugeHealthState
 from app.presenters.gauges.state import Floats, GaugesState
 from app.qt.theme import TextRole, Theme, set_property
 from app.qt.widgets.inputs import make_button

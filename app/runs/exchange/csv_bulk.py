@@ -53,12 +53,15 @@ def _single_blanks(data: bytes) -> bytes:
     return data.replace(b"\n ", b"\n").replace(b" \n", b"\n").lstrip(b" ")
 
 
+LIBRARY = "pyarrow.csv"
+"""What reads texts, and takes seconds to load on a busy computer."""
+
+
 @functools.cache
 def _arrow() -> Any:
     """The reader of pyarrow, of the extra `exchange`; None where it is not installed."""
     try:
-        importlib.import_module("pyarrow")
-        return importlib.import_module("pyarrow.csv")
+        return importlib.import_module(LIBRARY)
     except ImportError:
         return None
 
@@ -101,7 +104,7 @@ def _by_arrow(
 def _of_arrow(column: Any, stamps: StampColumn | None) -> NDArray[Any] | None:
     array = column.combine_chunks()
     if stamps is None:
-        return np.array(array.to_numpy(zero_copy_only=False), np.float64)
+        return _numbers(array)
     _, offsets, text = array.buffers()
     ends = np.frombuffer(offsets, np.int32)[array.offset : array.offset + len(array) + 1]
     lengths = np.diff(ends)
@@ -113,6 +116,18 @@ def _of_arrow(column: Any, stamps: StampColumn | None) -> NDArray[Any] | None:
         return stamps.parse_all(array.to_pylist())
     except StampError:
         return None
+
+
+def _numbers(array: Any) -> NDArray[np.float64]:
+    """Numbers of an array of pyarrow, NaN where there is none. Its own `to_numpy` imports pandas."""
+    if not len(array):
+        return np.empty(0)
+    there, values = array.buffers()
+    places = slice(array.offset, array.offset + len(array))
+    numbers = np.frombuffer(values, np.float64)[places].copy()
+    if there is not None:
+        numbers[np.unpackbits(np.frombuffer(there, np.uint8), bitorder="little")[places] == 0] = np.nan
+    return numbers
 
 
 def _by_numpy(

@@ -24,6 +24,7 @@ from app import child_process
 from app.child_process import START_S, CommandReader, EventSender, RequestProcess
 from app.log import start_log
 from app.runs.errors import ExtraMissingError, ImportFileError, RunError
+from app.runs.exchange import csv_bulk
 from app.runs.exchange.foreign_files import find_format
 from app.runs.exchange.importing import (
     Floats,
@@ -212,11 +213,12 @@ def main() -> None:
 def _load_reader(path: Path, send: Callable[[Event], object]) -> None:
     """Load what reads a file, before time without progress counts."""
     found = find_format(path)
-    if found is None or not found.reader:
+    library = csv_bulk.LIBRARY if found is None else found.reader
+    if not library:
         return
     send(ReadingProgress(0.0, is_loading=True))
     with contextlib.suppress(ImportError, MemoryError):  # `_answer` says so
-        importlib.import_module(found.reader)
+        importlib.import_module(library)
     send(ReadingProgress(0.0))
 
 

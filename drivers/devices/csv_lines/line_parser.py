@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from drivers.arrays import Ints, Record, Records, UInt8s, record_type
 from drivers.compiled import compiled, inlined
-from drivers.crc import crc16_slice
+from drivers.crc_slice import crc16_slice
 from drivers.devices.csv_lines.columns import MAX_STATUS_BYTES, Column, LineFormat
 from drivers.line_counting import LINE
 from drivers.samples import SampleStatus

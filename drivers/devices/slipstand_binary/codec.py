@@ -13,7 +13,8 @@ import numpy as np
 from drivers.arrays import Counts, Int32s, Ints, Record, Records, UInt8s, record_type
 from drivers.clock import MIN_SPAN_S, MIN_STEPS
 from drivers.compiled import compiled, inlined
-from drivers.crc import crc16, crc16_slice
+from drivers.crc import crc16
+from drivers.crc_slice import crc16_slice
 from drivers.errors import ProtocolError, SettingsError
 from drivers.packets import MAX_GAP_S, PACKET, PacketDecoder, count_packet, is_plausible_gap, state_type
 from messages.i18n import N_

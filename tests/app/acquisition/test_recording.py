@@ -77,7 +77,7 @@ class RememberingWriter:
     def close(self, ending):
         self.ending = ending
         samples = sum(len(block) for block in self.blocks)
-        return answer(StoredRun("/runs/run.h5", samples, self.raw_bytes_stored), self.open_error)
+        return answer(StoredRun(str(Path("/runs/run.h5")), samples, self.raw_bytes_stored), self.open_error)
 
     @property
     def time_s(self):

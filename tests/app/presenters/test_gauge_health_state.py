@@ -2,8 +2,10 @@
 
 import numpy as np
 
-from analysis.gauge_health import GaugeSamples, HealthGrade, measure_health
-from app.presenters.gauge_health import GaugeHealthState, gauge_health_state
+from analysis.gauge_health import GaugeSamples, measure_health
+from analysis.health_grade import HealthGrade
+from app.presenters.gauge_health import gauge_health_state
+from app.presenters.gauge_health_state import GaugeHealthState
 
 
 def shown(x: np.ndarray, rate_hz: float = 1000.0) -> GaugeHealthState:

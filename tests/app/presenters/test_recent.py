@@ -1,5 +1,7 @@
 """Runs, folders and amplifiers used last: newest first, few, saved at once."""
 
+from pathlib import Path
+
 from app.presenters.recent import FOLDERS_MAX, RUNS_MAX, RecentItems
 from config.schema import ConfigError, RecentUse
 
@@ -27,12 +29,13 @@ def test_changes_are_saved_and_only_those() -> None:
     recent = RecentItems(save=saved.append)
     recent.add_run("a")
     recent.add_run("a")
+    tables, logger = str(Path("/tables")), str(Path("/logger"))
     recent.set_export_target("/tables/table.csv")
     recent.set_import_file("/logger/a.csv")
     assert saved == [
         RecentUse(runs=("a",)),
-        RecentUse(runs=("a",), export_folder="/tables"),
-        RecentUse(runs=("a",), export_folder="/tables", import_folder="/logger"),
+        RecentUse(runs=("a",), export_folder=tables),
+        RecentUse(runs=("a",), export_folder=tables, import_folder=logger),
     ]
 
 

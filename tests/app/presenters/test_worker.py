@@ -319,8 +319,7 @@ def test_a_task_whose_process_does_not_start_fails_and_is_not_waited_for(monkeyp
     worker = Worker()
     answers = Answers(worker)
     with monkeypatch.context() as lacking:
-        lacking.setattr("socket.socketpair", _no_pipe)
-        lacking.setattr(os, "pipe", _no_pipe)
+        lacking.setattr("multiprocessing.connection.Pipe", _no_pipe)
         answers.submit(tell_process)
         assert not worker.is_busy
         worker.poll()
@@ -329,5 +328,5 @@ def test_a_task_whose_process_does_not_start_fails_and_is_not_waited_for(monkeyp
     worker.close()
 
 
-def _no_pipe(*_: object) -> None:
+def _no_pipe(*_: object, **_options: object) -> None:
     raise OSError(errno.EMFILE, "Too many open files")

@@ -16,10 +16,10 @@ from PySide6.QtWidgets import QApplication, QLineEdit, QPushButton, QScrollArea
 from pytestqt.qtbot import QtBot
 from stage import FakeWorker
 
-from analysis.gauge_health import HealthGrade
+from analysis.health_grade import HealthGrade
 from app.acquisition.messages import Connected
 from app.presenters.base import Chip, LabelledValue, Tone
-from app.presenters.gauge_health import GaugeHealthState, SymptomText
+from app.presenters.gauge_health_state import GaugeHealthState, SymptomText
 from app.presenters.gauges.presenter import GaugesPresenter
 from app.presenters.gauges.state import (
     ActiveCalibrations,

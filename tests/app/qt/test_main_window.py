@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
     QPlainTextEdit,
 )
 from pytestqt.qtbot import QtBot
-from stage import RUN, analysed
+from stage import FOLDER, RUN, analysed
 from window_desk import Desk
 
 from app.acquisition.messages import Failed, PortSettings
@@ -99,7 +99,7 @@ def test_unfinished_runs_are_asked_about_in_words_that_fit(desk: Desk) -> None:
     desk.presenter.ask_to_recover()
     desk.click("Recover")
     assert "Recovering runs" in desk.words()
-    assert [(call.name, call.arguments) for call in desk.worker.calls] == [("recover_runs", ("/recordings",))]
+    assert [(call.name, call.arguments) for call in desk.worker.calls] == [("recover_runs", (FOLDER,))]
 
 
 def test_screens_are_reached_by_keys_and_built_when_first_shown(desk: Desk) -> None:

@@ -1,11 +1,13 @@
 """The Start screen: last amplifier and recent runs at one click, and amplifiers found on the ports."""
 
+from pathlib import Path
+
 import pytest
 from looking import clipped_words, visible_words
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QApplication, QPushButton
 from pytestqt.qtbot import QtBot
-from stage import Call
+from stage import FOLDER, Call
 from window_desk import Desk
 
 from app.acquisition.messages import PortSettings
@@ -19,7 +21,7 @@ from config.schema import RecentDevice, RecentUse
 from tests.waiting import PATIENCE_MS
 
 LAST = RecentDevice("ME GSV-8 S/N 12345678", "/dev/serial/by-id/usb-FTDI_FT232R_A9001-if00", "csv")
-RUNS = tuple(f"/recordings/20260112T1015{number:02d}_1FFM0_{number:03d}.h5" for number in range(6))
+RUNS = tuple(str(Path(FOLDER, f"20260112T1015{number:02d}_1FFM0_{number:03d}.h5")) for number in range(6))
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QFont, QFontInfo, QFontMetricsF
+from PySide6.QtGui import QColor, QFont, QFontInfo, QFontMetricsF, QGuiApplication
 from PySide6.QtWidgets import QApplication, QLabel, QMenu, QTableWidget, QTreeView, QWidget
 from pytestqt.qtbot import QtBot
 
@@ -133,3 +133,11 @@ def test_text_is_as_wide_without_a_configuration_of_fonts():
         ).stdout  # fmt: skip
 
     assert widths() == widths(FONTCONFIG_SYSROOT="/absent")
+
+
+def test_the_plugin_of_windows_not_the_system_tells_who_fits_letters(monkeypatch):
+    """Windows without a screen draws by FreeType too: its texts were a pixel wider than their columns."""
+    monkeypatch.setattr(sys, "platform", "win32")
+    assert font(TextRole.TEXT).hintingPreference() is QFont.HintingPreference.PreferVerticalHinting
+    monkeypatch.setattr(QGuiApplication, "platformName", lambda: "windows")
+    assert font(TextRole.TEXT).hintingPreference() is QFont.HintingPreference.PreferDefaultHinting

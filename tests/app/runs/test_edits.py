@@ -76,6 +76,7 @@ def test_a_text_that_the_file_cannot_hold_is_refused(run_path, text):
     assert open_run(run_path).changes == ()
 
 
+@pytest.mark.usefixtures("symbolic_links")
 def test_an_edit_through_a_link_changes_the_run_and_leaves_the_link(run_path):
     link = run_path.with_name("link.h5")
     link.symlink_to(run_path.name)

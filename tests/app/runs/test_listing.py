@@ -10,8 +10,9 @@ import config
 from app.runs import listing as library_module
 from app.runs.edits import edit_run, undo_edit
 from app.runs.errors import RunNotFoundError, ValidationTimeoutError
-from app.runs.listing import RunFilter, find_run_files, index_path, list_runs
+from app.runs.listing import find_run_files, index_path, list_runs
 from app.runs.paths import recordings_directory
+from app.runs.run_filter import RunFilter
 from app.runs.saved_analyses import save_analysis
 from app.runs.validator import Validator
 from app.runs.writer import create_run

@@ -8,9 +8,10 @@ import h5py
 import pytest
 from runs_kit import END, small_run
 
-from app.runs.listing import RunFilter, list_runs
+from app.runs.listing import list_runs
 from app.runs.metadata import IMPORT_PROTOCOL, SIMULATION_PROTOCOL, RunMetadata, RunSource, create_metadata
 from app.runs.reader import open_run
+from app.runs.run_filter import RunFilter
 from config.files import load_gauges, load_stand
 from drivers.samples import DeviceIdentity
 

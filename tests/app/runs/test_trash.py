@@ -63,6 +63,7 @@ def test_a_folder_whose_names_cannot_be_made_to_last_loses_no_run(tmp_path, meta
     assert open_run(restore_from_trash(lies)).metadata == metadata
 
 
+@pytest.mark.usefixtures("symbolic_links")
 def test_what_is_no_run_stays_where_it_is(tmp_path, metadata):
     small_run(tmp_path / "run.h5", metadata)
     link, text = tmp_path / "link.h5", tmp_path / "notes.txt"

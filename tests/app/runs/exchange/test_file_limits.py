@@ -1,6 +1,7 @@
 """Foreign files that are larger than they look: refused by their declared sizes, before they are read."""
 
 import gzip
+import os
 import subprocess
 import sys
 import time
@@ -26,7 +27,7 @@ ROWS = 60
 def fault_of(path, plan=PLAN):
     with pytest.raises(ImportFileError) as caught:
         read_record(path, plan)
-    return str(caught.value).replace(f"{path.parent}/", "")
+    return str(caught.value).replace(f"{path.parent}{os.sep}", "")
 
 
 @pytest.mark.parametrize("chunk", [1 << 20, 1 << 26])
@@ -153,6 +154,29 @@ class RepeatedProgress:
         if timeout_s <= 0.0:
             raise TimeoutError
         return ReadingProgress(0.5)
+
+
+def test_what_reads_a_text_is_loaded_before_time_without_progress_counts(tmp_path):
+    """On a busy computer it takes longer than `PROGRESS_S`: sound files were called damaged."""
+    events = []
+    reading_process._load_reader(tmp_path / "a.csv", events.append)
+    assert [event.is_loading for event in events] == [True, False]
+
+
+def test_a_text_is_read_without_pandas(tmp_path):
+    """Its import takes seconds, and pyarrow's own way to numpy does it."""
+    path = tmp_path / "a.csv"
+    path.write_text("t,u1\n" + "".join(f"{row / 1000},{row if row % 7 else ''}\n" for row in range(1, ROWS)))
+    code = f"""
+import sys
+from pathlib import Path
+from app.runs.exchange.csv_layout import FileLayout
+from app.runs.exchange.importing import ImportPlan, read_record
+(cells,) = read_record(Path({str(path)!r}), ImportPlan(FileLayout("t", "u1"))).cells
+print([str(cell) for cell in cells[5:8]], "pyarrow" in sys.modules, "pandas" in sys.modules)
+"""
+    told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout
+    assert told.strip() == "['6.0', 'nan', '8.0'] True False"
 
 
 def test_progress_that_is_none_is_not_waited_for(tmp_path, monkeypatch):
