@@ -41,7 +41,7 @@ sleep 2; openbox > /dev/null 2>&1 &
 wine {program} --simulated > /tmp/window.log 2>&1 &
 for second in $(seq 150); do
   sleep 1; xdotool key a
-  [ -n "$(find /opt/windows/prefix/drive_c/users -name '*.h5.recording')" ] && break
+  [ -n "$(find /opt/windows/prefix/drive_c/users/root/Documents -name '*.h5.recording')" ] && break
 done
 sleep 60; import -window root /tmp/installed-window.png
 xdotool key alt+F4; for second in $(seq 30); do sleep 1; pgrep -f slipstand-window > /dev/null || break; done

@@ -9,6 +9,7 @@ import functools
 import importlib
 import itertools
 import math
+import shutil
 import tempfile
 import threading
 import time
@@ -107,6 +108,8 @@ class ReadingProcess:
     def __init__(self) -> None:
         self._process: RequestProcess[Request, Event] = RequestProcess(__name__, _decode_event)
         self._turn = threading.Lock()
+        self._removing = threading.Lock()
+        self._left: list[str] = []
 
     @property
     def pid(self) -> int | None:
@@ -121,7 +124,7 @@ class ReadingProcess:
         Raises RunError, also for a file over which the reader crashes, hangs or needs too much memory.
         """
         check_plan(plan)
-        with tempfile.TemporaryDirectory(prefix="slipstand-import-", ignore_cleanup_errors=True) as folder:
+        with self._temporary_folder() as folder:
             answer = self._ask(ReadRequest(str(path.absolute()), plan, folder), path, report)
             if not isinstance(answer, RecordRead):
                 raise _crashed(path)
@@ -145,6 +148,23 @@ class ReadingProcess:
 
     def stop(self) -> None:
         self._process.stop()
+        self._remove_folders()
+
+    @contextlib.contextmanager
+    def _temporary_folder(self) -> Iterator[str]:
+        folder = tempfile.mkdtemp(prefix="slipstand-import-")
+        try:
+            yield folder
+        finally:
+            self._remove_folders(folder)
+
+    def _remove_folders(self, *folders: str) -> None:
+        """Remove folders, and those that could not be before: Windows keeps files that arrays lie in."""
+        with self._removing:
+            self._left += folders
+            for folder in self._left:
+                shutil.rmtree(folder, ignore_errors=True)
+            self._left = [folder for folder in self._left if Path(folder).exists()]
 
     def _ask(self, request: Request, path: Path, report: Callable[[float], object]) -> Event:
         with self._turn:

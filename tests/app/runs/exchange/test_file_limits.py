@@ -163,6 +163,25 @@ def test_what_reads_a_text_is_loaded_before_time_without_progress_counts(tmp_pat
     assert [event.is_loading for event in events] == [True, False]
 
 
+def test_a_folder_that_windows_does_not_remove_yet_is_removed_with_the_next(tmp_path, monkeypatch):
+    """While the arrays of its record are in use: each import left its folder among the temporary files."""
+    path, process = tmp_path / "a.csv", ReadingProcess()
+    path.write_text("t,u1\n" + "".join(f"{row / 1000},{row}\n" for row in range(1, ROWS)))
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(temporary))
+    try:
+        with monkeypatch.context() as refusing, process.read(path, PLAN):
+            refusing.setattr("shutil.rmtree", lambda *_arguments, **_options: None)
+            folders = list(temporary.glob("slipstand-import-*"))
+        assert len(folders) == 1
+        with process.read(path, PLAN):
+            pass
+        assert list(temporary.glob("slipstand-import-*")) == []
+    finally:
+        process.stop()
+
+
 def test_a_text_is_read_without_pandas(tmp_path):
     """Its import takes seconds, and pyarrow's own way to numpy does it."""
     path = tmp_path / "a.csv"
