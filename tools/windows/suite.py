@@ -112,7 +112,7 @@ def table(folder: Path) -> str:
 
 def log_path(folder: Path, part: str) -> Path:
     """Path of what pytest wrote of a part."""
-    return folder / f"{re.sub(r'[^a-z0-9]+', '-', part.lower())}.log"
+    return folder / f"{re.sub(r'[^a-z0-9]+', '-', part.lower())[:100]}.log"
 
 
 def read_result(part: str, said: str, took_s: float) -> PartResult:
