@@ -20,7 +20,7 @@ from tools.packages.folder import BUILD, DIST
 from tools.packages.windows import INSTALLER_NAME
 from tools.windows.__main__ import default_folder
 from tools.windows.checks import Check
-from tools.windows.environment import EnvironmentMissingError, WindowsEnvironment
+from tools.windows.environment import INSIDE, EnvironmentMissingError, WindowsEnvironment
 
 _TRUE_FRICTION = 0.1
 _STARTS = 3
@@ -29,6 +29,7 @@ _DISPLAY = 78
 _KEPT = f"/home/{USER}/Documents/Slipstand"
 _OWN = (".cache", ".config", ".local/state")
 """Folders of a user that the program has one in, and that no package may remove from there."""
+_SETUP = f"{INSIDE}/setup.exe"
 _WINDOWS_FOLDER = "drive_c/Program Files/Slipstand"
 _OF_NSIS = "~nsu"
 """Start of the name of its uninstaller's copy, which Windows removes when it is started next."""
@@ -41,7 +42,7 @@ sleep 2; openbox > /dev/null 2>&1 &
 wine {program} --simulated > /tmp/window.log 2>&1 &
 for second in $(seq 150); do
   sleep 1; xdotool key a
-  [ -n "$(find /opt/windows/prefix/drive_c/users/root/Documents -name '*.h5.recording')" ] && break
+  [ -n "$(find "$WINEPREFIX"/drive_c/users/*/Documents -name '*.h5.recording')" ] && break
 done
 sleep 60; import -window root /tmp/installed-window.png
 xdotool key alt+F4; for second in $(seq 30); do sleep 1; pgrep -f slipstand-window > /dev/null || break; done
@@ -52,7 +53,7 @@ cat /tmp/window.log
 _WHILE_IT_RUNS = r"""
 wine {program} device simulate --tcp 0 --json > /tmp/simulated.log 2>&1 &
 for second in $(seq 120); do sleep 1; grep -q port /tmp/simulated.log && break; done
-wine /opt/windows/setup.exe /S; echo $?
+wine {setup} /S; echo $?
 wine {uninstaller} /S; sleep 15
 """
 """Ends with the program: all that is run inside ends with its shell."""
@@ -132,12 +133,12 @@ def try_debian_package(system: BareDebian) -> Iterator[Check]:
 def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
     """Install it silently under Wine, record the simulated stand twice, look at the window, and uninstall."""
     prefix = environment.inside / "prefix"
-    folder, inside = prefix / _WINDOWS_FOLDER, f"/opt/windows/prefix/{_WINDOWS_FOLDER}"
+    folder, inside = prefix / _WINDOWS_FOLDER, f"{INSIDE}/prefix/{_WINDOWS_FOLDER}"
     before = len(list((prefix / "drive_c" / "users").rglob("*.h5")))
     temporary = prefix / "drive_c" / "users" / "root" / "AppData" / "Local" / "Temp"
     temporary_before = set(temporary.glob("*"))
     shutil.copy(DIST / INSTALLER_NAME, environment.inside / "setup.exe")
-    yield _windows_step(environment, "install", ["wine", "/opt/windows/setup.exe", "/S"], _WINDOWS_S)
+    yield _windows_step(environment, "install", ["wine", _SETUP, "/S"], _WINDOWS_S)
     for name in ("ucrtbase.dll", "ucrtw.dll", "icuuc.dll"):  # what Wine lacks, not Windows
         shutil.copy(environment.inside / "python" / "cp311" / name, folder)
     program = ["wine", f"{inside}/slipstand.exe"]
@@ -162,7 +163,8 @@ def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
     yield _windows_step(
         environment, "uninstall", ["sh", "-c", f"wine '{inside}/uninstall.exe' /S; wineserver -w"], 300.0
     )
-    left = [path for path in (prefix / "drive_c").rglob("*") if "slipstand" in path.name.lower()]
+    named = (path for path in (prefix / "drive_c").rglob("*") if "slipstand" in path.name.lower())
+    left = [path for path in named if not path.is_relative_to(temporary)]  # whose new contents count
     users = prefix / "drive_c" / "users" / "root"
     own = (users / "Documents" / "Slipstand", users / "AppData" / "Local" / "slipstand")  # runs and settings
     kept = [path for path in left if any(path.is_relative_to(folder) for folder in own)]
@@ -177,7 +179,9 @@ def try_installer(environment: WindowsEnvironment) -> Iterator[Check]:
 def _while_it_runs(environment: WindowsEnvironment, folder: Path, inside: str) -> Check:
     """Neither installer nor uninstaller touches a program that runs."""
     script = _WHILE_IT_RUNS.format(
-        program=shlex.quote(f"{inside}/slipstand.exe"), uninstaller=shlex.quote(f"{inside}/uninstall.exe")
+        setup=_SETUP,
+        program=shlex.quote(f"{inside}/slipstand.exe"),
+        uninstaller=shlex.quote(f"{inside}/uninstall.exe"),
     )
     before = _files(folder)
     said = environment.run(["bash", "-c", script], _WINDOWS_S).stdout.split()

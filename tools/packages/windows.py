@@ -18,7 +18,7 @@ from tools.packages.folder import (
     windows_icon,
 )
 from tools.windows.__main__ import default_folder
-from tools.windows.environment import WindowsEnvironment
+from tools.windows.environment import INSIDE, WindowsEnvironment
 
 INSTALLER_NAME = f"slipstand-{__version__}-windows-x86_64-setup.exe"
 
@@ -50,7 +50,7 @@ def make_windows_folder(environment: WindowsEnvironment | None = None) -> Path:
             "sh",
             "-c",
             'cd "$0" && exec "$@"',
-            "/opt/windows/build/packaging",
+            f"{INSIDE}/build/packaging",
             "wine",
             python,
             *arguments,

