@@ -17,9 +17,9 @@ REPORT = "from analysis.caller import whole; print(whole(), len(whole.stats.cach
 
 
 def in_a_fresh_interpreter(directory: Path) -> tuple[str, ...]:
-    environment = {**os.environ, "PYTHONPATH": str(directory), "NUMBA_CACHE_DIR": str(directory / "cache")}
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(directory / "cache")}
     result = subprocess.run(
-        [sys.executable, "-c", REPORT],
+        [sys.executable, "-c", f"import sys; sys.path.insert(0, {str(directory)!r}); {REPORT}"],
         cwd=directory,
         env=environment,
         capture_output=True,

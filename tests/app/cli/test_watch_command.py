@@ -1,5 +1,7 @@
 """Files of a folder become runs, results, a table and a report."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -40,7 +42,7 @@ def test_files_are_imported_identified_and_tabulated_once(slipstand, tmp_path, i
 
     write_record(incoming, "b.csv", 2)
     again = slipstand("watch", incoming, *READ, *made, "--json").json
-    assert [document["run"].rpartition("/")[2] for document in again if "run" in document] == [
+    assert [Path(document["run"]).name for document in again if "run" in document] == [
         "recorded.h5", "b.h5",
     ]  # fmt: skip
     assert table.read_text().splitlines()[1].startswith("1FFM0,FF,0.012,131.6,3,")
