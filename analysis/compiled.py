@@ -83,10 +83,32 @@ def _kept(function: Callable[Parameters, Result], options: dict[str, Any]) -> Ca
         return function
     from numba import njit  # takes as long to import as a whole small command
 
-    dispatcher: Any = njit(nogil=True, cache=True, error_model="numpy", **options)(function)
-    index = dispatcher._cache._cache_file
-    index._source_stamp = (index._source_stamp, _sources())
+    dispatcher: Any = njit(nogil=True, error_model="numpy", **options)(function)
+    dispatcher._cache = _cache_type()(function)
     return cast("Callable[Parameters, Result]", dispatcher)
+
+
+@cache
+def _cache_type() -> Any:
+    """Cache of compiled functions on disk that follows `_sources`, and loads without what compiles.
+
+    Numba loads its implementations of all types and operations before it looks into the cache, which takes
+    0.15 s. It does so again before it compiles, so a function that is not in the cache loses nothing.
+    """
+    from numba.core.caching import FunctionCache
+    from numba.core.runtime.nrt import rtsys
+
+    class Cache(FunctionCache):
+        def __init__(self, function: FunctionType) -> None:
+            super().__init__(function)  # type: ignore[no-untyped-call]
+            self._cache_file._source_stamp = (self._cache_file._source_stamp, _sources())
+
+        def load_overload(self, signature: object, target: Any) -> Any:
+            rtsys.initialize(target)  # counts references to arrays
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(signature, target)  # type: ignore[no-untyped-call]
+
+    return Cache
 
 
 @cache

@@ -1,9 +1,10 @@
 """Compilation of the inner loops of decoders."""
 
 from collections.abc import Callable
-from typing import TypeVar, cast
+from typing import Any, TypeVar, cast
 
 import numba
+from numba.core.caching import FunctionCache
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -22,8 +23,21 @@ def inlined(function: _Function) -> _Function:
     return _compile(function, inline=True)
 
 
+class _Cache(FunctionCache):
+    """Compiled functions on disk, loaded without what numba needs to compile: 0.03 s instead of 0.17 s.
+
+    Numba loads its implementations of all types and operations before it looks into the cache. It does so
+    again before it compiles, so a function that is not in the cache loses nothing.
+    """
+
+    def load_overload(self, signature: object, target: Any) -> Any:
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(signature, target)  # type: ignore[no-untyped-call]
+
+
 def _compile(function: _Function, inline: bool) -> _Function:
-    decorate = numba.njit(  # type: ignore[call-overload]  # its stubs leave `_nrt` out
-        nogil=True, cache=True, error_model="numpy", forceinline=inline, _nrt=False
-    )
-    return cast(_Function, decorate(function))
+    dispatcher = numba.njit(  # type: ignore[call-overload]  # its stubs leave `_nrt` out
+        nogil=True, error_model="numpy", forceinline=inline, _nrt=False
+    )(function)
+    dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
+    return cast(_Function, dispatcher)

@@ -10,6 +10,7 @@ from typing import Any
 import config
 from app.cli import output as out
 from app.cli.device_options import ListDevicesOptions, ListPortsOptions, ProbeOptions
+from app.runs.analysis_request import quote_command
 from drivers.driver import DeviceDriver, DeviceVariant
 from drivers.host_checks import usb_chip_name
 from drivers.port import PortInfo, list_streams, other_port_users, port_info
@@ -135,7 +136,7 @@ def record_command(report: PortReport) -> str:
         words += ["--rate", found.rate_option]
     if found.channels == 1:
         words += ["--relative-port", "PORT-OF-GAUGE-2"]
-    return shlex.join(words)
+    return quote_command(words)
 
 
 def port_document(report: PortReport) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """`slipstand device simulate`: the simulated stand on a port."""
 
 import dataclasses
-import shlex
 import sys
 from functools import partial
 
@@ -10,6 +9,7 @@ import msgspec
 from app.cli import output as out
 from app.cli.device_options import SimulateDeviceOptions, StandOptions
 from app.cli.option_values import checked, key_values
+from app.runs.analysis_request import quote_command
 from app.simulated_stand.client import Ready
 from app.simulated_stand.effects import parse_effects
 from app.simulated_stand.options import SimulatedStandOptions
@@ -36,7 +36,7 @@ def _announce(ready: Ready, *, as_json: bool) -> None:
         rate = f"{ready.rate_hz:g} Hz"
         out.print_line(f"simulated stand {ready.series}, {ready.protocol}, {rate}: {ready.port}")
         if ready.calibration:
-            out.print_line(f"record from it with --calibration {shlex.quote(ready.calibration)}")
+            out.print_line(f"record from it with --calibration {quote_command([ready.calibration])}")
     sys.stdout.flush()
 
 

@@ -1,5 +1,6 @@
 """The commit that a program was made of, as it is known in a checkout and without one."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -47,6 +48,7 @@ def test_the_option_shows_version_and_commit():
     assert done.stdout == f"slipstand {version.version_text()}\n"
 
 
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed")
 def test_an_archive_of_the_sources_states_its_commit():
     archived = subprocess.run(
         ["git", "-C", str(ROOT), "check-attr", "export-subst", "app/commit.txt"],

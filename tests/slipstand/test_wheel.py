@@ -65,6 +65,7 @@ def test_it_has_one_top_level_package(wheel) -> None:
     assert "slipstand = slipstand.__main__:main" in scripts
 
 
+@pytest.mark.timeout(1800)  # compiles all anew, on a busy computer
 def test_a_stranger_gets_the_numbers_of_the_command_line(python, tmp_path, slipstand) -> None:
     slipstand("simulate", "--series", "2SSM1", "-o", tmp_path / "run.h5")
     (by_command,) = slipstand("analyze", tmp_path / "run.h5", "--json").json

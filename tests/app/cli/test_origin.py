@@ -1,6 +1,8 @@
 """Origin of results: what made them, of what, and a command that gives the same digits."""
 
 import csv
+import os
+import re
 import shlex
 import shutil
 from pathlib import Path
@@ -28,8 +30,16 @@ def run(simulated: Path, tmp_path: Path) -> Path:
     return Path(shutil.copy(simulated, tmp_path))
 
 
+_WINDOWS = os.name == "nt"
+_QUOTE = '"' if _WINDOWS else "'"
+
+
+def _split_on_windows(command: str) -> list[str]:
+    return [word.strip('"') for word in re.findall(r'"[^"]*"|\S+', command)]
+
+
 def repeated(slipstand: Any, command: str, *more: object) -> Any:
-    program, *words = shlex.split(command)
+    program, *words = _split_on_windows(command) if _WINDOWS else shlex.split(command)
     assert program == "slipstand"
     return slipstand(*words, *more)
 
@@ -88,7 +98,7 @@ def test_the_lines_of_a_simulated_result_say_so_and_name_its_origin(slipstand: A
     assert said.splitlines()[1].startswith("  SIMULATED: ")
     assert f"program     slipstand {__version__}" in said
     assert "gauge 1     SIM-1 of 2026-01-12 (" in said
-    assert f"reproduce   slipstand analyze '{run}' --model coulomb\n" in said
+    assert f"reproduce   slipstand analyze {_QUOTE}{run}{_QUOTE} --model coulomb\n" in said
 
 
 def test_results_of_samples_that_changed_since_are_not_served(slipstand: Any, run: Path) -> None:
@@ -160,7 +170,7 @@ def test_a_table_names_the_origin_of_every_result_and_its_command_gives_the_same
 def test_a_table_of_simulated_runs_says_so(slipstand: Any, campaign: Path, name: str) -> None:
     said = slipstand("table", campaign, "--format", name).out
     assert "SIMULATED: 2 of 2 runs" in said or said.count("simulated") == 2
-    assert f"slipstand table '{campaign}'" in said
+    assert f"slipstand table {_QUOTE}{campaign}{_QUOTE}" in said
 
 
 def test_a_report_is_repeated_to_the_byte(slipstand: Any, campaign: Path, tmp_path: Path) -> None:
@@ -176,7 +186,7 @@ def test_exported_coefficients_name_their_origin(slipstand: Any, run: Path, tmp_
     path = tmp_path / "found.csv"
     exported = slipstand("export", run, "--format", "csv", "--content", "coefficients", "-o", path)
     assert "SIMULATED" in exported.err
-    with path.open(newline="") as file:
+    with path.open(newline="", encoding="utf-8") as file:
         row = next(row for row in csv.DictReader(file) if row["quantity"] == "friction_dynamic")
     assert (row["source"], row["masses"]) == ("simulated", "m1 131.6 kg, m2 22.4 kg, g 9.81 m/s²")
     assert row["calibrations"].startswith("gauge 1 ")

@@ -3,6 +3,7 @@
 import csv
 import errno
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -233,7 +234,10 @@ def test_a_long_one_is_compiled_whatever_the_order_of_its_arguments(more: list[s
 
 @pytest.mark.parametrize("more", [[], ["--duration", "5"], ["--static-friction", "0.2", "--tilt", "0.01"]])
 def test_a_brief_one_is_the_same_without_compiled_code(slipstand: Any, more: list[str]) -> None:
-    """What it prints is that of compiled code, to the last digit, and numba is not even imported."""
+    """What it prints is that of compiled code, and numba is not even imported.
+
+    To the last digit, but on Windows, whose sine and exponential function are not those of the compiler.
+    """
     arguments = ["simulate", "--series", "1FFM0", "--friction", "0.12", *more, "--json"]
     code = (
         "import sys; from app.__main__ import main\ntry: main()\n"
@@ -242,4 +246,6 @@ def test_a_brief_one_is_the_same_without_compiled_code(slipstand: Any, more: lis
     command = [sys.executable, "-c", code, *arguments]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     assert done.stderr.split() == ["False"]
-    assert json.loads(done.stdout) == slipstand(*arguments).json
+    found, compiled = json.loads(done.stdout), slipstand(*arguments).json
+    assert found.pop("parameters") == compiled.pop("parameters")
+    assert found == (pytest.approx(compiled, rel=1e-12) if os.name == "nt" else compiled)

@@ -28,6 +28,9 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no 
 
 SHORT = {"rest_s": 0.2, "pull_s": 0.2, "hold_s": 0.2, "decay_s": 0.8, "recentre_s": 0.1}
 
+SILENCE_S = 2.0
+"""Without a byte, after which a stand that was told to stop has stopped; a busy computer may hold it up."""
+
 
 def listen(port: str, duration_s: float, rate_hz: float) -> tuple[np.ndarray, FrameDecoder]:
     """Counts of a stream of `duration_s`, started and stopped by command."""
@@ -40,7 +43,7 @@ def listen(port: str, duration_s: float, rate_hz: float) -> tuple[np.ndarray, Fr
         while time.monotonic() < end:
             blocks += decoder.feed(os.read(descriptor, 65536), 0)
         os.write(descriptor, b"P")
-        while select.select([descriptor], [], [], 0.2)[0]:
+        while select.select([descriptor], [], [], SILENCE_S)[0]:
             blocks += decoder.feed(os.read(descriptor, 65536), 0)
     finally:
         os.close(descriptor)
