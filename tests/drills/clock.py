@@ -32,11 +32,10 @@ from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
-from tests.drills.kill_engine import ask
 from tests.drills.power_loss import environment
 from tests.drills.preload import CLOCK, build_library, has_compiler
 from tests.drills.report import DrillReport, chosen_ways, run_ways
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drills.unplug import wait_for
 
 RATE_HZ = 500.0
@@ -156,7 +155,7 @@ def _check_run(ended: RunEnded, began: datetime.datetime, stand: SimulatedStand,
     if ended.ended is not EndReason.DURATION or len(run) != ended.samples or run.end is None:
         raise ValueError(f"{ended.path} ended as {ended.ended}: {ended.message}")
     report.samples += len(run)
-    Sent().check(ask(stand), load_counts(run), run.status)  # type: ignore[arg-type]
+    Sent().check(truth_of_now(stand), load_counts(run), run.status)  # type: ignore[arg-type]
     if not (np.diff(run.time_s) > 0).all():
         raise ValueError(f"the times of {ended.path} are not in order")
     start = run.metadata.known_start_time

@@ -38,9 +38,8 @@ from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
-from tests.drills.kill_engine import ask
 from tests.drills.report import DrillReport, arguments, run_ways
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drills.starving import Starving
 from tests.drills.unplug import wait_for
 
@@ -285,7 +284,7 @@ def _check(bench: Bench, ended: RunEnded, report: DiskReport) -> None:
 def _checked_rows(bench: Bench, path: Path) -> int:
     run = open_run(path)
     if len(run):
-        bench.sent.check(ask(bench.stand), load_counts(run), run.status)
+        bench.sent.check(truth_of_now(bench.stand), load_counts(run), run.status)
     return len(run)
 
 

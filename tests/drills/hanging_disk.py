@@ -37,10 +37,9 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from tests.drills.disk_full import environment
-from tests.drills.kill_engine import ask
 from tests.drills.preload import SYNC, build_library, has_compiler
 from tests.drills.report import DrillReport, arguments
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drills.unplug import wait_for
 
 RATE_HZ = 500.0
@@ -232,7 +231,7 @@ def _check_rebuilt(
         run = open_run(Path(recovery.run))
         counts = load_counts(run)
         assert counts is not None
-        end = Sent().check(ask(stand), counts, run.status)
+        end = Sent().check(truth_of_now(stand), counts, run.status)
         parts.append((end - len(run), end))
     report.runs += 1
     holes = [after[0] - before[1] for before, after in itertools.pairwise(parts) if after[0] > before[1]]

@@ -34,9 +34,8 @@ from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from drivers.crc import crc16
 from drivers.devices.slipstand_binary.codec import IDENTIFY, SYNC, frame_length, samples_per_frame
-from tests.drills.kill_engine import ask
 from tests.drills.report import DrillReport, chosen_ways, run_ways
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 
 RATE_HZ = 500.0
 MEMORY_MAX_BYTES = 600_000_000
@@ -208,7 +207,7 @@ def _one_run(way: str, folder: Path, seed: int, report: WireReport) -> None:
                         proxy.is_changing.set()
                     event = _await(engine, (Failed, RunEnded))
                 report.memory_bytes = _memory_bytes(engine.process_id)
-                truth = ask(stand)
+                truth = truth_of_now(stand)
         finally:
             proxy.close()
         if way in WIRES and not proxy.changed:

@@ -32,12 +32,11 @@ from app.runs.schema import STORED, TIME
 from app.runs.validation import is_finished
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
-from app.simulated_stand.truth import Truth
 from config.files import settings_file
 from drivers.simulated.stream_sender import TransmissionLog
 from tests.drills.processes import children_of, gone
 from tests.drills.report import DrillReport, arguments, run_ways
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drills.starving import Starving
 
 RATES_HZ = (1000.0, 2000.0)
@@ -165,7 +164,7 @@ def _one_kill(
             _await_file(folder)
             time.sleep(moments.uniform(0.0, 0.1 if aim is Aim.MAKING else DURATION_S / 2))
         children = children_of(engine.process_id)
-        sent = ask(stand).wire
+        sent = truth_of_now(stand).wire
         if aim is Aim.FLUSH:
             _await_write(folder, moments.uniform(0.0, 1e-3))
         for process_id in children if with_writer else ():
@@ -267,18 +266,7 @@ def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> int:
     """Hold all rows against what was sent; return the sample after the last."""
     counts = load_counts(run)
     assert counts is not None
-    return sent.check(ask(stand), counts, run.status)
-
-
-def ask(stand: SimulatedStand, patience_s: float = 30.0) -> Truth:
-    """The truth of this moment."""
-    before, deadline = stand.truth(), time.monotonic() + patience_s
-    stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell
-    while stand.truth() is before:
-        if time.monotonic() > deadline:
-            raise TimeoutError("the stand does not answer")
-        time.sleep(0.0005)
-    return stand.truth()
+    return sent.check(truth_of_now(stand), counts, run.status)
 
 
 def _wait_for(engine: EngineClient, kind: type[Event], patience_s: float = 60.0) -> Event:

@@ -18,10 +18,9 @@ from app.runs.reader import Run, load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
-from tests.drills.kill_engine import ask
 from tests.drills.processes import descendants_of, gone
 from tests.drills.report import DrillReport, arguments, run_ways
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drills.starving import Starving
 
 RATE_HZ = 1000.0
@@ -152,7 +151,7 @@ def _check(folder: Path, stand: SimulatedStand, sent: Sent, report: WindowReport
 def _check_rows(run: Run, stand: SimulatedStand, sent: Sent) -> None:
     counts = load_counts(run)
     assert counts is not None
-    sent.check(ask(stand), counts, run.status)
+    sent.check(truth_of_now(stand), counts, run.status)
 
 
 def main() -> int:

@@ -28,9 +28,8 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from tests.drills.disk_full import may_mount, small_disk
-from tests.drills.kill_engine import ask
 from tests.drills.report import DrillReport, chosen_ways, run_ways
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 
 RATE_HZ = 500.0
 DURATION_S = 2.0
@@ -181,7 +180,7 @@ def _record(trial: Trial) -> None:
         sent = Sent()
         for path in trial.place.rglob("*.h5"):
             run = open_run(path)
-            sent.check(ask(stand), load_counts(run), run.status)  # type: ignore[arg-type]
+            sent.check(truth_of_now(stand), load_counts(run), run.status)  # type: ignore[arg-type]
             trial.report.samples += len(run)
     told = json.loads(done.stdout)["samples"] if done.stdout else 0
     is_begun = "Recording:" in done.stderr

@@ -1,10 +1,12 @@
 """The counts that a simulated stand has sent, sample by sample, to compare recorded runs with."""
 
+import time
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.motion import RepeatedPullback, released_motion
 from app.simulated_stand.signal import StandSignal
 from app.simulated_stand.truth import Truth
@@ -15,8 +17,26 @@ from drivers.simulated.stream_sender import TransmissionLog
 _LOOKED_AT = 3
 """Rows that tell where in the signal a stretch begins: its noise makes them unique."""
 
+_MARK_S = 1e9
+"""Time of a disturbance that never comes: asked for in order, it is told after all that was asked before."""
+
 _NEARBY = 1000
 """Samples to each side among which one gauge's count is looked for."""
+
+
+def truth_of_now(stand: SimulatedStand, patience_s: float = 60.0) -> Truth:
+    """The truth of this moment, with all that was asked of the stand before. Raises TimeoutError."""
+    told, deadline = _count_marks(stand.truth()), time.monotonic() + patience_s
+    stand.disturb(f"jump 1 at {_MARK_S:g}")  # changes nothing but makes it tell
+    while _count_marks(stand.truth()) == told:
+        if time.monotonic() > deadline:
+            raise TimeoutError("the stand does not answer")
+        time.sleep(0.0005)
+    return stand.truth()
+
+
+def _count_marks(truth: Truth) -> int:
+    return sum(one.at_s == _MARK_S for one in truth.disturbances)
 
 
 @dataclass(frozen=True, slots=True)

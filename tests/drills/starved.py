@@ -36,11 +36,11 @@ from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
 from tests.drills.disk_full import disk_full
-from tests.drills.kill_engine import ask, kill_engine
+from tests.drills.kill_engine import kill_engine
 from tests.drills.kill_window import kill_window
 from tests.drills.processes import descendants_of, gone
 from tests.drills.report import DrillReport, arguments, run_ways
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drills.starving import ROLES, Starving
 from tests.drills.stopped_writer import stopped_writer
 
@@ -177,7 +177,7 @@ def _check(ended: RunEnded, stand: SimulatedStand, sent: Sent, report: StarvedRe
         raise ValueError(f"{len(run)} rows are in the file, {ended.samples} were told")
     counts = load_counts(run)
     assert counts is not None
-    truth = ask(stand)
+    truth = truth_of_now(stand)
     sent.check(truth, counts, run.status)
     assert run.end is not None
     off = abs(run.end.time_base.scale - RATE_HZ / truth.wire.true_rate_hz)

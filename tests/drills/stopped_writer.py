@@ -35,10 +35,9 @@ from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
-from tests.drills.kill_engine import ask
 from tests.drills.processes import descendants_of, gone
 from tests.drills.report import DrillReport
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drills.starving import is_a
 from tests.drills.unplug import wait_for
 
@@ -184,7 +183,7 @@ def _check(
     held = open_run(Path(found[0].run) if found else path)
     counts = load_counts(held)
     assert counts is not None
-    Sent().check(ask(stand), counts, held.status)
+    Sent().check(truth_of_now(stand), counts, held.status)
     if len(held) < ended.samples:
         raise ValueError(f"{ended.samples} samples were told, {len(held)} are held")
     report.runs += 1

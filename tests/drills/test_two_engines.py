@@ -10,7 +10,7 @@ from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
 from app.simulated_stand.options import SimulatedStandOptions
 from config.files import settings_file
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drills.unplug import wait_for
 
 RUNS = 3
@@ -37,12 +37,12 @@ def test_two_engines_in_one_folder_each_keep_their_own_runs(tmp_path):
             for engine, _ in engines:
                 engine.send(Arm(run))
             kept += [(wait_for(engine, RunEnded), simulated) for engine, simulated in engines]
-        for ended, simulated in kept:
+        for ended, _ in kept:
             assert ended.ended is EndReason.DURATION, ended.message
-            simulated.disturb("jump 1 at 1e9")  # makes it tell the truth of now
+        truths = [truth_of_now(simulated) for _, simulated in kept]
     assert len({ended.path for ended, _ in kept}) == 2 * RUNS == len(list(tmp_path.iterdir()))
-    for ended, simulated in kept:
+    for (ended, _), truth in zip(kept, truths, strict=True):
         recorded = open_run(ended.path)
         assert len(recorded) == ended.samples == 150
-        (stretch,) = Sent().stretches(simulated.truth(), load_counts(recorded), recorded.status)
+        (stretch,) = Sent().stretches(truth, load_counts(recorded), recorded.status)
         assert (stretch.first, stretch.end) == (0, 150)

@@ -37,7 +37,7 @@ from app.simulated_stand.truth import Truth
 from config.files import settings_file
 from drivers.samples import ABSENT, SampleStatus
 from tests.drills.report import DrillReport, arguments, run_ways
-from tests.drills.sent import Sent
+from tests.drills.sent import Sent, truth_of_now
 from tests.drivers.examples import RecordingExample, recording_examples
 
 DURATION_S = 4.0
@@ -145,7 +145,6 @@ def unplug(
                 said = f"run {number}, {kind}{' over TCP' if tcp else ''}"
                 try:
                     ended = _one_run(engine, stand, folder, kind, moments, report)
-                    time.sleep(0.05)
                     _check(ended, stand, sent, report, device)
                 except (ValueError, TimeoutError) as error:
                     report.faults.append(f"{said}: {error}")
@@ -180,9 +179,7 @@ def _check(
 ) -> None:
     """Hold a run against what was sent."""
     run = open_run(ended.path)
-    stand.disturb("jump 1 at 1e9")  # changes nothing but makes it tell the truth of now
-    time.sleep(0.1)
-    truth = stand.truth()
+    truth = truth_of_now(stand)
     report.runs += 1
     report.samples += ended.samples
     report.missing += ended.missing
