@@ -29,7 +29,6 @@ from app.simulated_stand.truth import Truth
 from config.files import load_gauges, settings_file
 
 FILES = (str(settings_file("stand.toml")), str(settings_file("gauges.toml")))
-TICK_S = 1.0 / os.sysconf("SC_CLK_TCK")
 SEED = 1
 CHECK_ROWS = 100_000  # compared at once
 PATIENCE_S = 600.0
@@ -175,7 +174,7 @@ def memory_kb(process_id: int) -> int:
 
 def processor_s(process_id: int) -> float:
     fields = Path(f"/proc/{process_id}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) * TICK_S
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def children(process_id: int) -> list[int]:

@@ -67,7 +67,8 @@ _NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:e[-+]\d+)?")
 _VARYING = (
     (re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?(\.\d+)?([+-]\d\d:\d\d|Z)?"), "DATE"),
     (re.compile(r"\b\d{8}T\d{6}"), "DATE"),
-    (re.compile(r"(?<!\w)(\.\.\.|[A-Za-z]:)?[/\\]([^\s'\":]*[/\\])?"), ""),  # folders
+    (re.compile(r"\\"), "/"),
+    (re.compile(r"(?<!\w)(\.\.\.|[A-Za-z]:)?/([^\s'\":]*/)?"), ""),  # folders
     (re.compile(r"slipstand \d+\.\d+\.\S+( \([0-9a-f]+(-dirty)?\))?"), "VERSION"),
     (re.compile(r"\b[0-9a-f]{16,64}\b"), "HASH"),
     (re.compile(r"\s+"), " "),

@@ -3,6 +3,7 @@
 import csv
 import dataclasses
 import json
+import os
 import re
 import zipfile
 from pathlib import Path
@@ -75,7 +76,10 @@ def whole_run(tmp_path_factory) -> Run:
 def exported(run: Run, poison: str) -> ExportedRun:
     """The run as if all its texts were the poison."""
     metadata = run.metadata.replace(operator=poison, note=poison, title=poison)
-    named = run.path.with_name(poison.replace("\0", "").replace("/", "")[:100] + ".h5")
+    name = poison
+    for mark in ("\0", "/", os.sep):
+        name = name.replace(mark, "")
+    named = run.path.with_name(name[:100] + ".h5")
     analysis = {**ANALYSIS, "series": poison, "run": poison, "warnings": [{"code": "x", "message": poison}]}
     foreign = dataclasses.replace(run, metadata=metadata, path=named)
     return ExportedRun(foreign, analysis, sample_columns(run))

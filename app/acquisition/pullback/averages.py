@@ -219,12 +219,14 @@ class ZeroLevel:
 class ZeroEstimator:
     """Moments of rest, of the last ten seconds at most."""
 
-    def __init__(self, rate_hz: float, tick_s: float) -> None:
+    def __init__(self, rate_hz: float) -> None:
         self._rate_hz = rate_hz
-        self._levels: deque[ZeroLevel] = deque(maxlen=round(_ZEROS_KEPT_S / tick_s))
+        self._levels: deque[ZeroLevel] = deque()
 
     def add(self, level: ZeroLevel) -> None:
         self._levels.append(level)
+        while self._levels[0].since < level.since - _ZEROS_KEPT_S * self._rate_hz:
+            self._levels.popleft()
 
     def reset(self) -> None:
         self._levels.clear()

@@ -36,6 +36,8 @@ from messages.i18n import N_
 from messages.message import EMPTY, Message, message
 
 _TICK_S = 0.02  # interval of slow checks; the release is looked for at each bin
+_CALM_TICKS = 10
+"""Of so many checks one is made while the zero is known and nothing moves: a level is a mean over 0.3 s."""
 _ZERO_S = 0.3  # length of a rest level: a longer one has less noise, but needs a calmer stand
 _HOLD_S = 0.2  # time in which the table must stand still to count as held
 _REFERENCE_S = 0.06
@@ -83,7 +85,7 @@ class PullbackStateMachine:
         self._bins_to_release = 2 if bins_per_s > 200.0 else 1
         self._bins = 0
         self._readings = RecentAverages(plan.rate_hz, self._binning.samples_per_bin)
-        self._rest = ZeroEstimator(plan.rate_hz, _TICK_S)
+        self._rest = ZeroEstimator(plan.rate_hz)
         self._noise_m = 0.0
         self._is_pulled = False
         self._moved_at = 0.0
@@ -129,7 +131,7 @@ class PullbackStateMachine:
         """Take consecutive samples (n,), NaN where there is no reading; return the transitions in order."""
         bins, seen = self._binning.add(first_index, table_m, relative_m), 0
         while seen < len(bins):
-            until_tick = self._bins_per_tick - self._bins % self._bins_per_tick
+            until_tick = self._bins_between_checks - self._bins % self._bins_between_checks
             some = bins[seen : seen + until_tick]
             if not self._is_quiet(some):
                 some = some[:1]
@@ -138,6 +140,11 @@ class PullbackStateMachine:
         self._keep_time(first_index + len(table_m))
         transitions, self._transitions = self._transitions, []
         return transitions
+
+    @property
+    def _bins_between_checks(self) -> int:
+        is_calm = self.is_at_rest and self.state is PullbackState.PULLING and self._rest.is_known
+        return self._bins_per_tick * (_CALM_TICKS if is_calm else 1)
 
     def _is_quiet(self, bins: BinAverages) -> bool:
         """Tell whether only the check at a tick is left of bins: taken in one piece they cost less."""
@@ -152,7 +159,7 @@ class PullbackStateMachine:
     def _on_bins(self, bins: BinAverages) -> None:
         self._readings.add(bins)
         self._bins += len(bins)
-        is_tick = self._bins % self._bins_per_tick == 0
+        is_tick = self._bins % self._bins_between_checks == 0
         index = bins.center[-1].item()
         self._last_reading = index
         if self._free is not None and self.state in _FREE:

@@ -11,12 +11,14 @@ from app.acquisition.messages import (
     Connected,
     Failed,
     PortSettings,
+    PullbackState,
     RunEnded,
     RunSettings,
+    StateChanged,
 )
 from app.runs.reader import Run, load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
-from app.simulated_stand.options import SimulatedStandOptions
+from app.simulated_stand.options import Gesture, SimulatedStandOptions
 from app.simulated_stand.truth import Truth
 from config.files import settings_file
 from tests.waiting import PATIENCE_S, wait_until
@@ -54,6 +56,12 @@ def until(engine: EngineClient, kind, **fields):
             return event
         assert not isinstance(event, Failed), event
     raise AssertionError(f"no {kind.__name__} {fields} within {PATIENCE_S:g} s")
+
+
+def pull_when_asked(engine: EngineClient, simulated: SimulatedStand) -> None:
+    """Pull a stand that is `on_demand` once, when the engine asks the operator to."""
+    until(engine, StateChanged, state=PullbackState.PULLING)
+    simulated.ask(Gesture.PULL)
 
 
 def index_of_first(run: Run, truth: Truth) -> int:

@@ -13,6 +13,7 @@ from app.acquisition.engine_client import record_runs
 from app.acquisition.messages import Connected, EndReason, PullbackState, StateChanged
 from app.runs.metadata import Conditions
 from app.runs.reader import open_run
+from app.simulated_stand.options import Gesture
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no pseudo-terminals")
 
@@ -20,8 +21,17 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no 
 def test_three_runs_over_one_connection_count_up_and_know_the_plate(tmp_path):
     run = run_in(tmp_path, conditions=Conditions(run_in_number=4, plate_id="P-7"))
     events = []
-    with stand(recentre_every=3) as simulated:
-        ended = list(record_runs(port_of(simulated), run, *FILES, events.append, count=3))
+    with stand(recentre_every=3, on_demand=True) as simulated:
+
+        def on_event(event):
+            events.append(event)
+            if isinstance(event, StateChanged) and event.state in (
+                PullbackState.PULLING,
+                PullbackState.RECENTRE,
+            ):
+                simulated.ask(Gesture.PULL)
+
+        ended = list(record_runs(port_of(simulated), run, *FILES, on_event, count=3))
     assert [one.ended for one in ended] == [EndReason.DURATION] * 3
     assert [one.remaining for one in ended] == [2, 1, 0]
     assert len([event for event in events if isinstance(event, Connected)]) == 1

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from engine_kit import connect, port_of, run_in, stand, until
+from engine_kit import connect, port_of, pull_when_asked, run_in, stand, until
 
 from app.acquisition.live_client import DIED_NOTE
 from app.acquisition.messages import Arm, EndReason, LiveResult, PullbackState, RunEnded, StateChanged, Stop
@@ -32,8 +32,12 @@ def live_process_of(engine_pid):
 
 
 def test_friction_is_told_while_the_motion_dies_away(tmp_path):
-    with stand(hold_s=5.0, decay_s=PATIENCE_S) as simulated, connect(port_of(simulated)) as engine:
+    with (
+        stand(on_demand=True, hold_s=5.0, decay_s=PATIENCE_S) as simulated,
+        connect(port_of(simulated)) as engine,
+    ):
         engine.send(Arm(run_in(tmp_path, duration_s=PATIENCE_S)))
+        pull_when_asked(engine, simulated)
         results = [until(engine, LiveResult) for _ in range(11)]
         engine.send(Stop())
         assert until(engine, RunEnded).ended is EndReason.STOPPED

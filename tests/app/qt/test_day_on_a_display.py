@@ -76,6 +76,7 @@ def amplifier(home: Path) -> Iterator[Amplifier]:
         process.stdout.close()  # type: ignore[union-attr]
 
 
+@pytest.mark.timeout(1800)
 def test_a_day_in_the_program(home: Path, amplifier: Amplifier) -> None:
     with window_system(home) as environment:
         with program(environment, home) as desk:
