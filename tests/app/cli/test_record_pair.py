@@ -21,6 +21,8 @@ from tests.waiting import PATIENCE_S
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="the simulated stand needs a pseudo-terminal")
 
 QUICK = {"rest_s": 0.5, "pull_s": 0.5, "hold_s": 0.6, "decay_s": 5.0, "recentre_s": 0.3}
+PATIENT = ["--trigger-timeout", 60, "--json"]
+HELD = QUICK | {"hold_s": 2.0}  # long enough to be seen where a busy computer leaves polls out
 
 
 @contextlib.contextmanager
@@ -46,17 +48,17 @@ def skip_where_polls_were_late(recorded: dict[str, Any]) -> None:
 
 
 def test_two_modbus_devices_find_the_true_friction(slipstand: Any, tmp_path: Path) -> None:
-    with two_stands(protocol="modbus", rate_hz=1000.0, **QUICK) as (first, second):
+    with two_stands(protocol="modbus", rate_hz=1000.0, **HELD) as (first, second):
         ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "modbus"]
-        wanted = ["--series", "1FFM0", "--rate", 100, "--pretrigger", 0.5, "--duration", 4.5, "--json"]
+        wanted = ["--series", "1FFM0", "--rate", 50, "--pretrigger", 0.5, "--duration", 4.5, *PATIENT]
         outcome = slipstand("record", *ports, "--directory", tmp_path, *wanted)
-        assert outcome.code == 0, outcome.err
         recorded = outcome.json
+        skip_where_polls_were_late(recorded)
+        assert outcome.code == 0, outcome.err
         true = first.truth().stand.friction_dynamic
-    skip_where_polls_were_late(recorded)
     run = open_run(recorded["run"])
     assert run.metadata.port == f"{first.port} + {second.port}"
-    assert recorded["samples"] == pytest.approx(500, abs=1)
+    assert recorded["samples"] == pytest.approx(250, abs=1)
     # both are asked at the same moments of the host's clock
     assert abs(recorded["skew_s"]) < recorded["skew_standard_uncertainty_s"] < 3e-3
     assert run.end.time_base.skew_s == recorded["skew_s"]
@@ -70,9 +72,9 @@ def test_two_modbus_devices_find_the_true_friction(slipstand: Any, tmp_path: Pat
 
 def test_two_transmitters_on_ethernet_find_the_true_friction(slipstand: Any, tmp_path: Path) -> None:
     device = {"map": "flintec-dad141"}
-    with two_stands(protocol="modbus", device=device, tcp_port=0, rate_hz=1000.0, **QUICK) as (first, second):
+    with two_stands(protocol="modbus", device=device, tcp_port=0, rate_hz=1000.0, **HELD) as (first, second):
         ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "modbus"]
-        wanted = ["--series", "1FFM0", "--rate", 100, "--pretrigger", 0.5, "--duration", 4.5, "--json"]
+        wanted = ["--series", "1FFM0", "--rate", 50, "--pretrigger", 0.5, "--duration", 4.5, *PATIENT]
         given = ["--set", "map=flintec-dad141", "--directory", tmp_path]
         recorded = slipstand("record", *ports, *given, *wanted).json
         true = first.truth().stand.friction_dynamic
@@ -85,8 +87,7 @@ def test_two_transmitters_on_ethernet_find_the_true_friction(slipstand: Any, tmp
 
 def test_two_multimeters_find_the_true_friction(slipstand: Any, tmp_path: Path) -> None:
     """Lines that are asked for have the host's time, so those of two ports belong together."""
-    held = QUICK | {"hold_s": 2.0}  # long enough to be seen where a busy computer leaves polls out
-    with two_stands(protocol="csv", device={"format": "scpi-read"}, **held) as (first, second):
+    with two_stands(protocol="csv", device={"format": "scpi-read"}, **HELD) as (first, second):
         ports = ["--port", first.port, "--relative-port", second.port, "--protocol", "csv"]
         wanted = ["--series", "1FFM0", "--pretrigger", 0.5, "--duration", 4.5, "--json"]
         given = ["--set", "format=scpi-read", "--directory", tmp_path, "--trigger-timeout", 60]
