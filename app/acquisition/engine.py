@@ -265,7 +265,9 @@ class Engine:
         def prepare() -> tuple[Journal, Message]:
             note = check_disk_space(folder, run, demand)
             self._disk.begin(folder, demand)
-            return run_setup.create_run_journal(self._port, run, metadata), note  # last: nobody closes it else
+            return run_setup.create_run_journal(
+                self._port, run, metadata
+            ), note  # last: nobody closes it else
 
         self._arming = Arming(run, metadata, prepare)
         self._arming.wait(_ARMING_WAIT_S)

@@ -131,7 +131,7 @@ def find_format(path: Path) -> Format | None:
 
 
 def _open(found: Format, path: Path, layout: FileLayout, report: ReportShare) -> Table:
-    module: Any = importlib.import_module(f"app.runs.exchange.formats.{found.module}")
+    module: Any = importlib.import_module(found.module_name)
     table: Table = module.open_table(path, layout, report)
     return table
 

@@ -233,12 +233,11 @@ def main() -> None:
 def _load_reader(path: Path, send: Callable[[Event], object]) -> None:
     """Load what reads a file, before time without progress counts."""
     found = find_format(path)
-    library = csv_bulk.LIBRARY if found is None else found.reader
-    if not library:
-        return
+    modules = (csv_bulk.LIBRARY,) if found is None else (*found.readers, found.module_name)
     send(ReadingProgress(0.0, is_loading=True))
-    with contextlib.suppress(ImportError, MemoryError):  # `_answer` says so
-        importlib.import_module(library)
+    for name in modules:
+        with contextlib.suppress(ImportError, MemoryError):  # `_answer` says so
+            importlib.import_module(name)
     send(ReadingProgress(0.0))
 
 

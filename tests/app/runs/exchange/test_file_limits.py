@@ -163,6 +163,27 @@ def test_what_reads_a_text_is_loaded_before_time_without_progress_counts(tmp_pat
     assert [event.is_loading for event in events] == [True, False]
 
 
+def test_what_reads_a_file_of_parquet_is_loaded_before_time_without_progress_counts(tmp_path):
+    """Pandas too, which pyarrow imports when it gives arrays: a second of processor time."""
+    pa, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    path = tmp_path / "a.parquet"
+    parquet.write_table(pa.table({name: np.arange(20.0) for name in ("t", "u1", "u2")}), path)
+    code = """
+import sys
+from pathlib import Path
+from app.runs.exchange.importing import ImportPlan, read_record
+from app.runs.exchange.csv_layout import FileLayout
+from app.runs.exchange.reading_process import _load_reader
+path = Path(sys.argv[1])
+_load_reader(path, lambda _: None)
+before = set(sys.modules)
+read_record(path, ImportPlan(FileLayout("t", "u1", "u2")), lambda _: None, lambda cells: cells)
+print(sorted({name.partition(".")[0] for name in set(sys.modules) - before} - set(sys.stdlib_module_names)))
+"""
+    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_a_folder_that_windows_does_not_remove_yet_is_removed_with_the_next(tmp_path, monkeypatch):
     """While the arrays of its record are in use: each import left its folder among the temporary files."""
     path, process = tmp_path / "a.csv", ReadingProcess()
