@@ -265,9 +265,10 @@ class Engine:
         def prepare() -> tuple[Journal, Message]:
             note = check_disk_space(folder, run, demand)
             self._disk.begin(folder, demand)
-            return run_setup.create_run_journal(
+            journal = run_setup.create_run_journal(
                 self._port, run, metadata
-            ), note  # last: nobody closes it else
+            )  # last: a fault leaves none open
+            return journal, note
 
         self._arming = Arming(run, metadata, prepare)
         self._arming.wait(_ARMING_WAIT_S)

@@ -29,7 +29,6 @@ from app.acquisition.messages import (
     RunEnded,
     RunSettings,
     RunStarted,
-    Stop,
 )
 from app.runs.reader import load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
@@ -41,9 +40,7 @@ from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent, truth_of_now
 from tests.drivers.examples import RecordingExample, recording_examples
 
-LONGEST_S = 300.0
-"""A run is stopped when the device has been back for `AFTER_S`, which a busy computer sees late."""
-AFTER_S = 1.0
+DURATION_S = 4.0
 PULLED_WITHIN_S = 1.0
 AWAY_S = (0.05, 2.0)
 RETURN_LIMIT_S = 2.0
@@ -101,7 +98,7 @@ def unplug(
     tcp: bool = False,
     seed: int | None = None,
     protocol: str = "slipstand-binary",
-    return_limit_s: float = RETURN_LIMIT_S,
+    duration_s: float = DURATION_S,
 ) -> UnplugReport:
     """Pull the cable of a simulated stand once in each of `count` runs.
 
@@ -118,8 +115,8 @@ def unplug(
         Makes the moments repeatable.
     protocol : str
         One of `DEVICES`.
-    return_limit_s : float
-        How long after its return a device may be looked for.
+    duration_s : float
+        Of a run; a busy computer pulls the cable and sees the return late.
     """
     device = DEVICES[protocol]
     gauges_file = settings_file("gauges.toml")
@@ -150,8 +147,8 @@ def unplug(
             for number in range(count):
                 said = f"run {number}, {kind}{' over TCP' if tcp else ''}"
                 try:
-                    ended = _one_run(engine, stand, folder, kind, moments, report, return_limit_s)
-                    _check(ended, stand, sent, report, device)
+                    ended = _one_run(engine, stand, folder, kind, moments, report, duration_s)
+                    _check(ended, stand, sent, report, device, duration_s)
                 except (ValueError, TimeoutError) as error:
                     report.faults.append(f"{said}: {error}")
     return report
@@ -164,9 +161,9 @@ def _one_run(
     kind: str,
     moments: random.Random,
     report: UnplugReport,
-    return_limit_s: float,
+    duration_s: float,
 ) -> RunEnded:
-    engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=LONGEST_S)))
+    engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=duration_s)))
     wait_for(engine, RunStarted)
     time.sleep(moments.uniform(0.0, PULLED_WITHIN_S))
     away_s = moments.uniform(*AWAY_S)
@@ -174,17 +171,20 @@ def _one_run(
     returns_s = time.monotonic() + away_s
     wait_for(engine, Reconnected)
     report.back_after_s.append(time.monotonic() - returns_s)
-    if report.back_after_s[-1] > return_limit_s:
+    if report.back_after_s[-1] > RETURN_LIMIT_S:
         report.faults.append(f"back only {report.back_after_s[-1]:.2f} s after the return")
-    time.sleep(AFTER_S)
-    engine.send(Stop())
     ended = wait_for(engine, RunEnded)
     assert isinstance(ended, RunEnded)
     return ended
 
 
 def _check(
-    ended: RunEnded, stand: SimulatedStand, sent: Sent, report: UnplugReport, device: RecordingExample
+    ended: RunEnded,
+    stand: SimulatedStand,
+    sent: Sent,
+    report: UnplugReport,
+    device: RecordingExample,
+    duration_s: float,
 ) -> None:
     """Hold a run against what was sent."""
     run = open_run(ended.path)
@@ -194,7 +194,7 @@ def _check(
     report.missing += ended.missing
     report.missing_estimated += ended.missing_estimated
     report.damaged += ended.damaged
-    if ended.ended is not EndReason.STOPPED or len(run) != ended.samples:
+    if ended.ended is not EndReason.DURATION or len(run) != round(duration_s * ended.rate_hz):
         raise ValueError(f"ended {ended.ended} with {len(run)} rows: {ended.message}")
     marked = int(np.count_nonzero(run.status & SampleStatus.MISSING))
     if marked != ended.missing + ended.missing_estimated or not marked:

@@ -11,12 +11,10 @@ from app.acquisition.messages import (
     Arm,
     Connected,
     EndReason,
-    Health,
     PortSettings,
     RunEnded,
     RunSettings,
     RunStarted,
-    Stop,
 )
 from app.runs.reader import Run, load_counts, open_run
 from app.simulated_stand.client import SimulatedStand
@@ -27,9 +25,8 @@ from drivers.driver import GAUGES
 from drivers.samples import ABSENT_BY_GAUGE
 from tests.drills.sent import Sent, truth_of_now
 from tests.drills.unplug import (
-    AFTER_S,
     AWAY_S,
-    LONGEST_S,
+    DURATION_S,
     PULLED_WITHIN_S,
     RETURN_LIMIT_S,
     UnplugReport,
@@ -49,7 +46,7 @@ def unplug_pair(
     tcp: bool = False,
     seed: int | None = None,
     protocol: str = "modbus",
-    return_limit_s: float = RETURN_LIMIT_S,
+    duration_s: float = DURATION_S,
 ) -> UnplugReport:
     """Pull the cable of one of two devices of one gauge, in turn, once in each of `count` runs.
 
@@ -85,44 +82,28 @@ def unplug_pair(
             for number in range(count):
                 lost = number % 2
                 try:
-                    ended = _one_run(engine, stands[lost], folder, kind, moments)
-                    _check(ended, lost, stands, sent, starts_at_s, report, rate_hz, return_limit_s)
+                    ended = _one_run(engine, stands[lost], folder, kind, moments, duration_s)
+                    _check(ended, lost, stands, sent, starts_at_s, report, rate_hz, duration_s)
                 except (ValueError, TimeoutError) as error:
                     report.faults.append(f"run {number}, {kind} of gauge {lost + 1}: {error}")
     return report
 
 
 def _one_run(
-    engine: EngineClient, stand: SimulatedStand, folder: Path, kind: str, moments: random.Random
+    engine: EngineClient,
+    stand: SimulatedStand,
+    folder: Path,
+    kind: str,
+    moments: random.Random,
+    duration_s: float,
 ) -> RunEnded:
-    engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=LONGEST_S)))
+    engine.send(Arm(RunSettings(str(folder), series="1FFM0", trigger="none", duration_s=duration_s)))
     wait_for(engine, RunStarted)
     time.sleep(moments.uniform(0.2, PULLED_WITHIN_S))
-    away_s = moments.uniform(*AWAY_S)
-    stand.disturb(f"{kind} {away_s:.3f}")
-    truth_of_now(stand)  # it has begun
-    time.sleep(away_s)
-    _wait_for_both(engine)
-    time.sleep(AFTER_S)
-    engine.send(Stop())
+    stand.disturb(f"{kind} {moments.uniform(*AWAY_S):.3f}")
     ended = wait_for(engine, RunEnded)
     assert isinstance(ended, RunEnded)
     return ended
-
-
-def _wait_for_both(engine: EngineClient) -> None:
-    """Wait until most rows between two messages have readings of both gauges."""
-    before = None
-    while True:
-        health = wait_for(engine, Health)
-        assert isinstance(health, Health)
-        if before is not None and _absent(health) - _absent(before) < 0.5 * (health.samples - before.samples):
-            return
-        before = health
-
-
-def _absent(health: Health) -> int:
-    return health.missing + health.missing_estimated + health.damaged
 
 
 def _check(
@@ -133,7 +114,7 @@ def _check(
     starts_at_s: float,
     report: UnplugReport,
     rate_hz: float,
-    return_limit_s: float,
+    duration_s: float,
 ) -> None:
     """Hold a run against what both stands took."""
     run = open_run(ended.path)
@@ -142,7 +123,7 @@ def _check(
     report.missing += ended.missing
     report.missing_estimated += ended.missing_estimated
     report.damaged += ended.damaged
-    if ended.ended is not EndReason.STOPPED or len(run) != ended.samples:
+    if ended.ended is not EndReason.DURATION or abs(len(run) - duration_s * rate_hz) > 1:
         raise ValueError(f"ended {ended.ended} with {len(run)} rows: {ended.message}")
     gone = [np.flatnonzero(run.status & int(flag)) for flag in ABSENT_BY_GAUGE]
     if len(gone[lost]) < AWAY_S[0] * rate_hz or len(gone[lost]) > len(run) - 10:
@@ -154,14 +135,14 @@ def _check(
     returned_s = max(
         one.at_s + one.seconds
         for one in truths[lost].disturbances
-        if one.at_s is not None and one.at_s < began_s + run.time_s[-1]
+        if one.at_s is not None and one.at_s < began_s + duration_s
     )
     there = np.setdiff1d(np.arange(len(run)), gone[lost])
     again_s = began_s + run.time_s[there] - returned_s
     if not (again_s > 0.0).any():
         raise ValueError("not back before the end of the run")
     report.back_after_s.append(float(again_s[again_s > 0.0].min()))
-    if report.back_after_s[-1] > return_limit_s:
+    if report.back_after_s[-1] > RETURN_LIMIT_S:
         raise ValueError(f"back only {report.back_after_s[-1]:.2f} s after the return")
 
 
