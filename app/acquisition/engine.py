@@ -265,10 +265,8 @@ class Engine:
         def prepare() -> tuple[Journal, Message]:
             note = check_disk_space(folder, run, demand)
             self._disk.begin(folder, demand)
-            journal = run_setup.create_run_journal(
-                self._port, run, metadata
-            )  # last: a fault leaves none open
-            return journal, note
+            # The journal is made last: an earlier fault leaves none open.
+            return run_setup.create_run_journal(self._port, run, metadata), note
 
         self._arming = Arming(run, metadata, prepare)
         self._arming.wait(_ARMING_WAIT_S)
