@@ -29,11 +29,11 @@ def test_every_test_file_is_of_one_part() -> None:
 
 
 def test_what_ended_is_counted_and_the_rest_was_not_run() -> None:
-    found = read_result("drivers", _SAID, 12.0)
+    found = read_result("drivers", _SAID, 12.0, "0cdd80ff")
     assert (found.passed, found.skipped, found.not_run) == (1, 1, 3)
     assert found.failed == ("tests/a/test_c.py::test_fails", "tests/a/test_d.py::test_leaves_a_thread")
 
 
 @pytest.mark.parametrize("said", ["", "ImportError"])
 def test_a_process_that_said_nothing_passed_nothing(said: str) -> None:
-    assert read_result("drivers", said, 1.0).passed == 0
+    assert read_result("drivers", said, 1.0, "0cdd80ff").passed == 0

@@ -78,7 +78,7 @@ def run_part(environment: WindowsEnvironment, part: str, folder: Path, limit_s: 
     paths = paths_of(part)
     if not paths:
         raise FileNotFoundError(f"no tests: {part}. Name one of {', '.join(PARTS)}, or files")
-    began_s = time.perf_counter()
+    began_s, commit = time.perf_counter(), _commit()
     try:
         ended = environment.run_python(
             "-m", "pytest", "-vv", "-m", "not peer and not realtime", "-rfE", "--tb=short",
@@ -88,7 +88,7 @@ def run_part(environment: WindowsEnvironment, part: str, folder: Path, limit_s: 
         said = ended.stdout + ended.stderr
     except subprocess.TimeoutExpired as error:
         said = (error.stdout or b"").decode(errors="replace")
-    found = read_result(part, said, time.perf_counter() - began_s)
+    found = read_result(part, said, time.perf_counter() - began_s, commit)
     folder.mkdir(parents=True, exist_ok=True)
     log_path(folder, part).write_text(said, encoding="utf-8")
     (folder / SUMMARY_NAME).write_bytes(msgspec.json.encode(_kept(folder) | {part: found}))
@@ -115,7 +115,7 @@ def log_path(folder: Path, part: str) -> Path:
     return folder / f"{re.sub(r'[^a-z0-9]+', '-', part.lower())[:100]}.log"
 
 
-def read_result(part: str, said: str, took_s: float) -> PartResult:
+def read_result(part: str, said: str, took_s: float, commit: str) -> PartResult:
     """Counts of what pytest said, also where it was ended before it counted."""
     outcomes = {test: outcome for outcome, test in _ENDED.findall(said)}  # an error of its end comes last
     failed = tuple(test for test, outcome in outcomes.items() if outcome in {"FAILED", "ERROR"})
@@ -125,7 +125,7 @@ def read_result(part: str, said: str, took_s: float) -> PartResult:
     return PartResult(
         part=part,
         date=f"{datetime.now(UTC):%Y-%m-%d}",
-        commit=_commit(),
+        commit=commit,
         passed=passed,
         failed=failed,
         skipped=len(outcomes) - passed - len(failed),
