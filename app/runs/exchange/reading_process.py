@@ -128,14 +128,10 @@ class ReadingProcess:
             answer = self._ask(ReadRequest(str(path.absolute()), plan, folder), path, report)
             if not isinstance(answer, RecordRead):
                 raise _crashed(path)
-            arrays = [
-                np.load(Path(folder) / f"{number}.npy", mmap_mode="r") for number in range(answer.columns)
-            ]
-            if sum(array.nbytes for array in arrays) > _LARGE_BYTES:
+            if sum(file.stat().st_size for file in Path(folder).iterdir()) > _LARGE_BYTES:
                 with self._turn:
                     self._process.stop()
-            facts = msgspec.structs.replace(answer.facts, notes=tuple(map(_unpacked, answer.facts.notes)))
-            yield ForeignRecord(facts, arrays[0], tuple(arrays[1:]))
+            yield _mapped_record(answer, folder)  # not held here: Windows keeps files that arrays lie in
 
     def survey(
         self, path: Path, options: ParseOptions, report: Callable[[float], object] = lambda _: None
@@ -290,6 +286,15 @@ def _packed_value(value: Value) -> Value:
     if isinstance(value, float) and not math.isfinite(value):
         return Message(_FLOAT, {"text": str(value)})
     return _packed(value) if isinstance(value, Message) else value
+
+
+def _mapped_record(answer: RecordRead, folder: str) -> ForeignRecord:
+    """Record whose arrays lie in files of the folder."""
+    time, *readings = (
+        np.load(Path(folder) / f"{number}.npy", mmap_mode="r") for number in range(answer.columns)
+    )
+    facts = msgspec.structs.replace(answer.facts, notes=tuple(map(_unpacked, answer.facts.notes)))
+    return ForeignRecord(facts, time, tuple(readings))
 
 
 def _unpacked(text: Message) -> Message:
