@@ -597,7 +597,11 @@ def _with_static_open(fitted: SlipEnd, chosen: Fit, largest: float, end_s: float
 
 
 def _scatter(fit: Fit, about_s: float, end_s: float, largest: float) -> float:
-    """Root mean square distance from `about_s` of the ends of slip of drawn parameters of `fit`."""
+    """Root mean square distance from `about_s` of the ends of slip of drawn parameters of `fit`.
+
+    f_s is held where its standard deviation exceeds it: rounding decides how far a fit at f_s = f_d leaves
+    it open, and `_with_static_open` takes every f_s that the record allows.
+    """
     inverse, _ = covariance(fit.normal_matrix)
     # Scaled, since parameters differ by many orders, and symmetric, so that rounding decides nothing.
     variance = np.diag(inverse)
@@ -606,7 +610,11 @@ def _scatter(fit: Fit, about_s: float, end_s: float, largest: float) -> float:
     root = (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T * scale
     drawn = np.tile(fit.parameters, (_DRAWS, 1))
     drawn[:, fit.free] += np.random.default_rng(_DRAWS).standard_normal((_DRAWS, len(fit.free))) @ root
-    drawn[:, Parameter.FRICTION_STATIC] = np.minimum(drawn[:, Parameter.FRICTION_STATIC], largest)
+    static = fit.value(Parameter.FRICTION_STATIC)
+    is_open = variance[fit.free == Parameter.FRICTION_STATIC] > static**2
+    drawn[:, Parameter.FRICTION_STATIC] = (
+        static if is_open.any() else np.minimum(drawn[:, Parameter.FRICTION_STATIC], largest)
+    )
     return _rms_distance(np.vstack((fit.parameters, drawn)), fit.law, about_s, end_s)
 
 

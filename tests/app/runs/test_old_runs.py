@@ -36,6 +36,8 @@ _LATER_WARNINGS = {
     "tilt-static-3FFM1.h5": ("tilt-beyond-level", *_UNSTATED),  # of 3 mrad
 }
 """Codes that the earlier version did not give, by run; `_UNSTATED` for the others."""
+_OPEN_STATIC_COUNTED_TWICE = "negative-3FFM3.h5"
+"""Run without noise in whose end of slip the earlier version drew an open f_s besides all allowed ones."""
 _CLOCK = "time base (not stated)"
 _WITH_TIME = ("period_s", "stiffness_n_per_m", "friction_dynamic")
 
@@ -155,6 +157,9 @@ def test_old_runs_analyse_to_the_same_digits(folder, expected, capsys, monkeypat
         one["budget"] = _of_old_results(one, other)
         assert_wider_breakaway(one, other)
         take_budget(one, other)
+        if other["run"] == _OPEN_STATIC_COUNTED_TWICE:
+            uncertainty_s = one["events"].pop("slip_end_uncertainty_s")
+            assert 0.0 < uncertainty_s <= other["events"].pop("slip_end_uncertainty_s")
     assert_same(now, two_gauges, "analyze")
 
 
