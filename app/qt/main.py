@@ -65,6 +65,7 @@ def run_window(simulated: bool = False, series: str = "1FFM0", run: str = "") ->
         box.setTextFormat(Qt.TextFormat.PlainText)
         box.exec()
         return _refuse(str(error))
+    interrupts = _close_on_interrupt(presenter)  # first: Qt drops what is raised in its callbacks
     window = MainWindow(theme, presenter, _load_layout(errors))
     window.closed.connect(lambda layout: _save_layout(layout, errors))
     if run:
@@ -74,6 +75,7 @@ def run_window(simulated: bool = False, series: str = "1FFM0", run: str = "") ->
     else:
         first = None
     code = _run(app, window, presenter, first)
+    code = _INTERRUPTED if interrupts else code
     while (late := errors.next_report()) is not None:
         sys.stderr.write(f"error: {translate(late.message)}\n")
     return code
@@ -116,7 +118,6 @@ def _run(
     app: QApplication, window: MainWindow, presenter: WindowPresenter, first: Callable[[], None] | None
 ) -> int:
     """Show the window until it is closed; `first` is called once it is there."""
-    interrupts = _close_on_interrupt(presenter)
     window.show()
     if first is None:
         window.show_last_screen_soon()
@@ -126,8 +127,7 @@ def _run(
     QTimer.singleShot(_WARM_UP_MS, window, presenter.warm_up)
     QTimer.singleShot(_WARM_UP_MS, window, exempt_from_collection)
     QTimer.singleShot(0, window, presenter.ask_to_recover)
-    code = app.exec()
-    return _INTERRUPTED if interrupts else code
+    return app.exec()
 
 
 def exempt_from_collection() -> None:

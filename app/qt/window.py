@@ -1,6 +1,7 @@
 """The main window: side bar, notice, and the screens, each built when first shown."""
 
 import importlib
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
@@ -54,7 +55,7 @@ class MainWindow(KeyboardWindow):
         self._theme = theme
         self._presenter = presenter
         self._geometry = WindowGeometry(place or WindowLayout())
-        self._shown = presenter.state
+        self._shown = replace(presenter.state, is_closing=False)  # Ctrl-C may have come by now
         self._screens: dict[Screen, QWidget] = {}
         self._find: FindDialog | None = None
         self._stand: QDialog | None = None

@@ -11,6 +11,7 @@ import pytest
 from app.runs import file_operations, listing, reader
 from app.runs.exchange import exporting
 from app.runs.validator import Validator, shared_validator
+from tests.waiting import PATIENCE_S
 
 if TYPE_CHECKING:
     from PySide6.QtWidgets import QApplication
@@ -96,6 +97,12 @@ def short_runs(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     options = CampaignOptions(series=("1FFM0", "2SSM1"), repeats=1, rate_hz=300.0, duration_s=5.0)
     tests = plan_tests(options, load_stand(), load_gauges(), tmp_path_factory.mktemp("short"), began)
     return [Path(write_test(test).path) for test in tests]
+
+
+@pytest.fixture
+def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read all of the last runs: on a busy computer a few take longer than the program waits for them."""
+    monkeypatch.setattr("app.runs.campaign.last_runs._LONGEST_S", PATIENCE_S)
 
 
 @pytest.fixture(scope="session")

@@ -1,6 +1,8 @@
 """Samples of both gauges at rest."""
 
+import itertools
 from collections.abc import Iterator
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -46,6 +48,8 @@ def test_a_stream_is_watched_for_so_many_samples() -> None:
 
 def test_samples_that_stay_away_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "TIMEOUT_S", -0.95)
+    clock_s = itertools.count(0.0, 0.004)  # looked at before each read
+    monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: next(clock_s)))
     with pytest.raises(NoSamplesError, match=r"only 40 of 100 samples came in 0\.05 s"):
         collect_samples(FakeStream(10), 1.0, load_gauges())
 

@@ -168,6 +168,7 @@ def test_checks_of_gauges_are_told(slipstand: Any, own_folders: Path) -> None:
     assert found(outcome)["gauge checks"]["state"] == "fail"
 
 
+@pytest.mark.usefixtures("unhurried")
 def test_effects_of_the_stand_over_its_last_runs_are_told(
     slipstand: Any, real_stand_runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -93,6 +93,7 @@ def test_plan_refuses_what_cannot_be_in_one_line(slipstand, options, fault):
     assert said.err.count("\n") == 1
 
 
+@pytest.mark.usefixtures("unhurried")
 def test_effects_of_the_last_runs_are_planned_with(slipstand, real_stand_runs):
     test = ("plan", "--series", "1FFM0", "--rate", 500, "--duration", 5, "--last-runs", real_stand_runs)
     planned = slipstand(*test, "--json").json
@@ -115,6 +116,7 @@ def test_effects_of_the_last_runs_are_planned_with(slipstand, real_stand_runs):
     assert ideal["last_runs"] is None
 
 
+@pytest.mark.usefixtures("unhurried")
 def test_plan_says_what_the_last_runs_show_and_what_it_costs(slipstand, real_stand_runs, monkeypatch):
     monkeypatch.setenv("SLIPSTAND_RECORDINGS", str(real_stand_runs))
     said = slipstand("plan", "--series", "1FFM0").out

@@ -22,6 +22,17 @@ show = MainWindow.show
 MainWindow.show = lambda window: (show(window), os.kill(os.getpid(), signal.SIGINT))
 sys.exit(run_window())
 """
+INTERRUPTED_BEFORE = """
+import os, signal, sys
+from app.qt.main import run_window
+from app.qt.window import MainWindow
+build = MainWindow.__init__
+def interrupted(window, *arguments):
+    os.kill(os.getpid(), signal.SIGINT)
+    build(window, *arguments)
+MainWindow.__init__ = interrupted
+sys.exit(run_window())
+"""
 RUN_NAMED = """
 import os, signal, sys
 from app.__main__ import main
@@ -54,7 +65,9 @@ def run(code: str, **changes: str | None) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a process cannot send itself Ctrl-C there")
-@pytest.mark.parametrize("code", [WINDOW, INTERRUPTED_EARLY], ids=["open", "opening"])
+@pytest.mark.parametrize(
+    "code", [WINDOW, INTERRUPTED_EARLY, INTERRUPTED_BEFORE], ids=["open", "opening", "before"]
+)
 def test_the_window_opens_and_closes_on_ctrl_c_and_keeps_how_it_was_left(code: str, tmp_path: Path) -> None:
     (tmp_path / "window.toml").write_text('screen = "settings"\nwidth = 1100\nheight = 700\n')
     (tmp_path / "settings.toml").write_text('theme = "dark"\nlanguage = "ru"\n')

@@ -13,16 +13,12 @@ from app.runs.metadata import RunSource, create_metadata
 from app.runs.saved_analyses import save_analysis
 from config.files import load_gauges, load_stand
 from tests.app.runs.runs_kit import ANALYSIS, small_run
-from tests.waiting import PATIENCE_S
 
 STAND = load_stand()
 DAY = datetime.datetime(2026, 11, 21, tzinfo=datetime.UTC)
 
 
-@pytest.fixture(autouse=True)
-def unhurried(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a busy computer a few runs take longer than the program waits for them."""
-    monkeypatch.setattr(last_runs, "_LONGEST_S", PATIENCE_S)
+pytestmark = pytest.mark.usefixtures("unhurried")
 
 
 def write(folder: Path, number: int, *, kept: bool = True, stand: str = STAND.name, **changes: Any) -> None:
