@@ -40,7 +40,7 @@ from tests.drills.report import DrillReport, arguments, run_ways
 from tests.drills.sent import Sent, truth_of_now
 from tests.drivers.examples import RecordingExample, recording_examples
 
-DURATION_S = 4.0
+DURATION_S = 6.0  # a device that is away longest, and comes back as late as it may, is back before
 PULLED_WITHIN_S = 1.0
 AWAY_S = (0.05, 2.0)
 RETURN_LIMIT_S = 2.0
