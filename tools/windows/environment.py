@@ -145,8 +145,9 @@ class WindowsEnvironment:
             shutil.rmtree(left)
         target = self.inside / "packages" / f"slipstand-{stated.version}.dist-info"
         target.mkdir()
-        for name in ("METADATA", "entry_points.txt"):
-            (target / name).write_text(stated.read_text(name) or "", encoding="utf-8")
+        facts = stated.read_text("METADATA") or stated.read_text("PKG-INFO")  # once a wheel was built there
+        for name, text in (("METADATA", facts), ("entry_points.txt", stated.read_text("entry_points.txt"))):
+            (target / name).write_text(text or "", encoding="utf-8")
 
     def _make(self, name: str, key: str, make: Callable[[], None]) -> None:
         marker, digest = self.folder / f"{name}.made", hashlib.sha256(key.encode()).hexdigest()

@@ -50,7 +50,12 @@ def _files(findings: Sequence[Finding]) -> Iterator[tuple[str, str, str]]:
 
 
 def _versions() -> dict[str, object]:
-    installed = {found.metadata["Name"]: found.version for found in metadata.distributions()}
+    whole = (
+        found
+        for found in metadata.distributions()
+        if found.read_text("METADATA") or found.read_text("PKG-INFO")  # an upgrade that failed leaves none
+    )
+    installed = {found.metadata["Name"]: found.version for found in whole}
     return {
         "slipstand": __version__,
         "python": sys.version,

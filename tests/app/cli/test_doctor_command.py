@@ -331,6 +331,21 @@ def test_a_bundle_holds_what_a_bug_report_needs_and_says_so(
     assert slipstand("doctor", "--bundle", target).code == 1, "nothing is overwritten without --force"
 
 
+def test_a_bundle_is_made_of_an_installation_that_is_damaged(
+    slipstand: Any, own_folders: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An upgrade that failed leaves a package without its facts."""
+    (own_folders / "lost-1.0.dist-info").mkdir()
+    (own_folders / "whole-2.0.dist-info").mkdir()
+    (own_folders / "whole-2.0.dist-info" / "METADATA").write_text("Name: whole\nVersion: 2.0\n")
+    monkeypatch.syspath_prepend(str(own_folders))
+    target = own_folders / "report.zip"
+    assert slipstand("doctor", "--bundle", target).code == 0
+    with zipfile.ZipFile(target) as bundle:
+        libraries = json.loads(bundle.read("versions.json"))["libraries"]
+    assert (libraries["whole"], "lost" in libraries, "null" in libraries) == ("2.0", False, False)
+
+
 def test_what_killed_programs_left_among_the_runs_is_said(slipstand: Any, own_folders: Path) -> None:
     runs = own_folders / "runs"
     (runs / "below").mkdir(parents=True)
