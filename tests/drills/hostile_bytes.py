@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.envelope import HEADER_BYTES, MAGIC, MAX_DATA_BYTES
 from drivers.samples import ABSENT, INCOMPLETE, SampleBlock
 from drivers.stream import Decoder
 from tests.drills.report import DrillReport
@@ -83,10 +84,16 @@ def hostile_bytes(speaker: Speaker, megabytes: float, frames: int, seed: int = 0
 def _judge(speaker: Speaker, report: HostileReport) -> None:
     if speaker.has_checksum and report.never_sent > 10 + 5 * report.frames * CRC_CHANCE:
         report.faults.append(f"{report.never_sent} samples were taken for good that were never sent")
-    if report.held_bytes > HELD_BYTES_MAX:
+    if report.held_bytes > _held_bytes_most(speaker):
         report.faults.append(f"{report.held_bytes} bytes were held")
     if report.growth_bytes > GROWTH_BYTES_MAX:
         report.faults.append(f"memory grew by {report.growth_bytes / 1e6:.0f} MB")
+
+
+def _held_bytes_most(speaker: Speaker) -> int:
+    """One envelope where frames are envelopes: chance lets a damaged length pass its CRC-16."""
+    frame, *_ = speaker.frames(0, np.zeros((1, 2), np.int32))
+    return HEADER_BYTES + MAX_DATA_BYTES if frame.startswith(MAGIC) else HELD_BYTES_MAX
 
 
 def _random_bytes(speaker: Speaker, size: int, rng: np.random.Generator, report: HostileReport) -> None:
