@@ -222,8 +222,11 @@ def read_with_ldaq(python: str, port: str, rate_hz: float, seconds: float, feede
 
 
 def reads_port(process_id: int, port: str) -> bool:
-    files = Path(f"/proc/{process_id}/fd").iterdir()
-    return any(os.path.realpath(file) == port for file in files)
+    for file in Path(f"/proc/{process_id}/fd").iterdir():
+        with contextlib.suppress(FileNotFoundError):  # closed meanwhile
+            if os.path.realpath(file) == port:
+                return True
+    return False
 
 
 def measured(process_ids: list[int], seconds: float, feeder: Feeder) -> Row:
