@@ -43,7 +43,8 @@ def skip_where_polls_were_late(recorded: dict[str, Any]) -> None:
     left_out = recorded["missing"] + recorded["missing_estimated"] + recorded["damaged"]
     late = left_out / recorded["samples"]
     if late > 0.1:
-        assert "too busy to poll" in recorded["message"]
+        # A row lacks a reading where either device was asked late; the program looks at each alone.
+        assert late <= 0.2 or "too busy to poll" in recorded["message"]
         pytest.skip(f"this computer is too busy for its polls: {late:.0%} of them were late")
 
 
