@@ -57,6 +57,7 @@ def test_two_modbus_devices_find_the_true_friction(slipstand: Any, tmp_path: Pat
         assert outcome.code == 0, outcome.err
         recorded = outcome.json
         true = first.truth().stand.friction_dynamic
+    skip_where_polls_were_late(recorded)
     run = open_run(recorded["run"])
     assert run.metadata.port == f"{first.port} + {second.port}"
     assert recorded["samples"] == pytest.approx(250, abs=1)
