@@ -52,6 +52,7 @@ def test_silx_finds_what_to_plot_with_its_units(run, numbers):
 
 
 @pytest.mark.peer
+@pytest.mark.filterwarnings("ignore:Setting the shape on a NumPy array:DeprecationWarning:nexusformat")
 def test_nexusformat_finds_what_nexpy_plots_and_its_labels(run, numbers):
     """NexPy labels an axis by `long_name`, without adding units."""
     nexus = pytest.importorskip("nexusformat.nexus", reason="nexusformat is not installed")
