@@ -28,7 +28,7 @@ def main() -> int:
         "wheel": make_wheel,
         "tarball": lambda: linux.make_archive(folder),
         "deb": lambda: linux.make_debian_package(folder),
-        "windows": lambda: windows.make_installer(windows.make_windows_folder()),
+        "windows": windows.make_windows_installer,
     }
     for kind in kinds:
         _report(makers[kind])

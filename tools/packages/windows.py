@@ -23,6 +23,13 @@ from tools.windows.environment import INSIDE, WindowsEnvironment
 INSTALLER_NAME = f"slipstand-{__version__}-windows-x86_64-setup.exe"
 
 
+def make_windows_installer() -> Path:
+    """Build the folder and the installer of it."""
+    if shutil.which("makensis") is None:
+        raise SystemExit("error: makensis, which packs the installer, is not here. Install NSIS")
+    return make_installer(make_windows_folder())
+
+
 def make_windows_folder(environment: WindowsEnvironment | None = None) -> Path:
     """Build the folder, on Windows by its own Python, elsewhere under Wine."""
     if sys.platform == "win32":
