@@ -21,12 +21,12 @@ DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 # What logs the system calls that the drill of a power cut rebuilds disks from, and mounts a disk that hangs.
 TEST_PACKAGES := strace bindfs gcc libc6-dev
 
-.PHONY: audit licences wheel drill-tools test-tools docs translations help setup installed run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-environment quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
+.PHONY: same-python audit licences wheel drill-tools test-tools docs translations help setup installed run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-environment quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
 	@echo "make run     the window on the simulated stand; without a display, 'slipstand demo'"
-	@echo "make test    all tests"
+	@echo "make test    all tests; with another Python by PYTHON=python3.13 VENV=.venv-3.13"
 	@echo "make lint    ruff, mypy, import contracts, the schema of workflows"
 	@echo "make bench   benchmarks, ratios in one run (docs/benchmarks.md)"
 	@echo "make bench-recording   recording, release detection, library and recovery, a quarter of an hour"
@@ -48,9 +48,18 @@ help:
 	@echo "make docs    the documentation site into docs/_build/html, which needs no network"
 	@echo "make translations   new texts into the catalogues of messages/locale"
 
-setup: $(COMPILED)
+setup: same-python $(COMPILED)
 
 installed: $(READY)
+
+# An environment keeps the Python that made it: another one that is asked for needs another environment.
+same-python:
+	@:
+ifneq ($(origin PYTHON),file)
+	@version='import sys; print("%d.%d" % sys.version_info[:2])'; wanted=$$($(PYTHON) -c "$$version") || exit 1; \
+	has=$$(test ! -x $(BIN)/python && echo $$wanted || $(BIN)/python -c "$$version"); test "$$has" = "$$wanted" || \
+		{ echo "error: $(VENV) has Python $$has, not $$wanted. Add VENV=.venv-$$wanted" >&2; exit 1; }
+endif
 
 # uv, which takes a fifth of pip's time, by its hashes; pip where there is none, or where only pip knows the index.
 $(READY): requirements.lock pyproject.toml setup.py | system-libraries
@@ -118,7 +127,7 @@ run: setup
 
 # By files, in the order of tests/conftest.py: pytest-xdist would begin with the one that has most tests. Those in
 # real time are few and long, so that a worker without any takes over from one that has many.
-test: compiled
+test: same-python compiled
 	$(BIN)/python -m pytest tests -m "not realtime" -n $(TEST_WORKERS) --dist loadfile --no-loadscope-reorder
 	$(BIN)/python -m pytest tests -m realtime -n 4 --dist worksteal
 
