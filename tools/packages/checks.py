@@ -40,7 +40,7 @@ Xvfb :{display} -screen 0 1280x800x24 > /dev/null 2>&1 &
 export DISPLAY=:{display}
 sleep 2; openbox > /dev/null 2>&1 &
 wine {program} --simulated > /tmp/window.log 2>&1 &
-for second in $(seq 150); do
+for second in $(seq 600); do
   sleep 1; xdotool key a
   [ -n "$(find "$WINEPREFIX"/drive_c/users/*/Documents -name '*.h5.recording')" ] && break
 done
