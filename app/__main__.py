@@ -3,9 +3,9 @@
 import os
 import sys
 
+from app.child import ONE_THREAD
 from app.interrupts import EXIT_CODE, LINE, follow_interrupts, ignore_interrupts
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 _RUN_SUFFIX = ".h5"
 _COMPLETION = "_SLIPSTAND_COMPLETE"  # set by a shell that asks for the next word of a command
 
@@ -25,8 +25,8 @@ def main() -> None:
 def _run() -> None:
     """Run what the arguments ask for. Nothing heavy is imported before it is known to be needed."""
     arguments = sys.argv[1:]
-    for name in _THREADS:  # small matrices: more threads only wait for each other
-        os.environ.setdefault(name, "1")
+    for name, count in ONE_THREAD.items():
+        os.environ.setdefault(name, count)
     if getattr(sys, "frozen", False):
         _keep_caches_apart()
         arguments = _run_if_child(arguments)

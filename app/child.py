@@ -7,6 +7,14 @@ import sys
 from collections.abc import Iterator
 from typing import NoReturn
 
+ONE_THREAD = dict.fromkeys(
+    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
+)
+"""Environment in which linear algebra starts no threads.
+
+Small matrices gain nothing from them, and their start takes as long as the rest of numpy's import.
+"""
+
 
 @contextlib.contextmanager
 def loading() -> Iterator[None]:

@@ -23,6 +23,8 @@ from typing import Any, Generic, Self, TypeVar
 
 import msgspec
 
+from app.child import ONE_THREAD
+
 _log = logging.getLogger(__name__)
 
 Command = TypeVar("Command")
@@ -44,7 +46,6 @@ _SESSION_SIGNALS = ("SIGINT", "SIGHUP", "SIGBREAK")
 """They reach all processes of a terminal; the parent decides what they mean."""
 _END_SIGNALS = ("SIGINT", "SIGTERM", "SIGBREAK")
 _STD_INPUT_HANDLE, _SYNCHRONIZE = -10, 0x10_0000  # of Windows
-_ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 
 class LineDecoder(Generic[Decoded]):
@@ -98,7 +99,7 @@ def spawn(
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL if discard_stderr else None,
-            env=os.environ | _ONE_THREAD if is_background else None,
+            env=os.environ | ONE_THREAD,
             creationflags=flags,
         )
 

@@ -15,6 +15,7 @@ import pytest
 from schema_kit import check_output
 
 from app.__main__ import main
+from app.child import ONE_THREAD
 from messages import i18n
 
 hypothesis.settings.register_profile("house", deadline=None)  # a busy machine is slow, and not wrong
@@ -22,8 +23,8 @@ hypothesis.settings.load_profile("house")
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ["SLIPSTAND_LOGS"] = tempfile.mkdtemp(prefix="slipstand-logs-")
-for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
-    os.environ.setdefault(_threads, "1")  # small matrices: more threads only wait for each other
+for _name, _count in ONE_THREAD.items():
+    os.environ.setdefault(_name, _count)
 
 # Tests that follow a stand in real time want the machine for themselves: `make test` runs them last.
 REALTIME_FILES = {

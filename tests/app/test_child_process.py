@@ -20,6 +20,7 @@ from app.acquisition.messages import (
     decode_command,
     decode_event,
 )
+from app.child import ONE_THREAD
 from app.child_process import (
     ChildProcess,
     CommandReader,
@@ -286,6 +287,14 @@ def test_windows_opens_no_console_for_a_child(monkeypatch, is_background, flags)
     monkeypatch.setattr(subprocess, "Popen", lambda _, **options: given.update(options))
     spawn("app.runs.writer", is_background=is_background)
     assert given["creationflags"] == flags
+
+
+def test_children_start_no_threads_for_linear_algebra(monkeypatch):
+    given = {}
+    monkeypatch.setattr(subprocess, "Popen", lambda _, **options: given.update(options))
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "8")
+    spawn("app.runs.writer")
+    assert given["env"] == os.environ | ONE_THREAD
 
 
 def test_a_process_sees_that_its_parent_has_ended():

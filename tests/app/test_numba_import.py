@@ -1,7 +1,8 @@
-"""Processes of the program start numba without scipy.linalg, and both work afterwards."""
+"""Processes of the program start numba without what it only looks for, and that works afterwards."""
 
 import subprocess
 import sys
+from pathlib import Path
 
 _PROCESS = """
 import sys
@@ -9,8 +10,9 @@ import app
 import numpy as np
 from drivers.crc_slice import crc16_slice
 crc16_slice(np.zeros(4, np.uint8), 0, 4)
-assert "numba" in sys.modules and "scipy.linalg" not in sys.modules
+assert "numba" in sys.modules and "scipy.linalg" not in sys.modules and "yaml" not in sys.modules
 import scipy.linalg
+import yaml
 from numba import njit
 assert njit(lambda a: a @ a)(np.eye(2)).tolist() == scipy.linalg.expm(np.zeros((2, 2))).tolist()
 """
@@ -19,3 +21,12 @@ assert njit(lambda a: a @ a)(np.eye(2)).tolist() == scipy.linalg.expm(np.zeros((
 def test_numba_starts_without_scipy_linalg_and_finds_it_when_a_product_needs_it() -> None:
     done = subprocess.run([sys.executable, "-c", _PROCESS], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_settings_file_of_numba_in_the_current_folder_is_read(tmp_path: Path) -> None:
+    (tmp_path / ".numba_config.yaml").write_text("parallel_diagnostics: 3\n")
+    process = "import app, numba; print(numba.config.PARALLEL_DIAGNOSTICS)"
+    done = subprocess.run(
+        [sys.executable, "-c", process], capture_output=True, text=True, check=False, cwd=tmp_path
+    )
+    assert (done.stdout.strip(), done.stderr) == ("3", "")

@@ -34,7 +34,7 @@ from drivers.polling import (
 from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import SampleSource, check_rate, parse_settings
+from drivers.stream import RATE_GROWTH, SampleSource, check_rate, parse_settings
 from messages.i18n import N_
 from messages.message import EMPTY, Message, joined, message
 
@@ -182,7 +182,7 @@ class CsvLinesSource(SampleSource):
             return first
         layout = self._layout
         more, good = self.await_data(
-            link, self.timeout_s, lambda data: codec.rate_from_lines(layout, first + data)
+            link, self.timeout_s, lambda data: codec.rate_from_lines(layout, first + data), RATE_GROWTH
         )
         if not good:
             template = N_("the lines of {timeout_s:g} s do not tell a rate: the device is too slow")

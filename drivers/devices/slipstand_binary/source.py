@@ -12,7 +12,7 @@ from drivers.errors import ProtocolError
 from drivers.recognition import IdentityQuery, Recognition, rate_from_count, unless_coincidence
 from drivers.samples import ChannelFilter, DeviceIdentity
 from drivers.source import LineSettings, Link
-from drivers.stream import SampleSource, parse_settings
+from drivers.stream import RATE_GROWTH, SampleSource, parse_settings
 from messages.i18n import N_
 from messages.message import Message, message
 
@@ -60,7 +60,9 @@ class SlipstandBinarySource(SampleSource):
     def resume(self, link: Link) -> bytes:
         received, sends = self.await_data(link, _LISTEN_S, codec.has_frame)
         if sends:
-            more, _ = self.await_data(link, _RATE_S, lambda data: codec.rate_from_frames(received + data))
+            more, _ = self.await_data(
+                link, _RATE_S, lambda data: codec.rate_from_frames(received + data), RATE_GROWTH
+            )
             received += more
         rate_hz = codec.rate_from_frames(received)
         if self._rate_hz and rate_hz and self.is_same_rate(rate_hz):
@@ -87,7 +89,10 @@ class SlipstandBinarySource(SampleSource):
         return confirmed
 
     def _await_frames(self, link: Link, timeout_s: float, *, measure: bool) -> bytes:
-        received = self.await_stream(link, codec.rate_from_frames if measure else codec.has_frame, timeout_s)
+        if measure:
+            received = self.await_stream(link, codec.rate_from_frames, timeout_s, RATE_GROWTH)
+        else:
+            received = self.await_stream(link, codec.has_frame, timeout_s)
         rate_hz = codec.rate_from_frames(received) if measure else None
         if not self.is_same_rate(rate_hz):
             template = N_(
