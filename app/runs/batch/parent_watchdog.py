@@ -10,13 +10,15 @@ import threading
 import time
 from _thread import interrupt_main
 from collections.abc import Callable, Iterator
-from multiprocessing import connection
-from typing import NoReturn, TypeAlias
+from typing import TYPE_CHECKING, NoReturn, TypeAlias
+
+if TYPE_CHECKING:
+    from multiprocessing import connection
 
 if sys.platform == "win32":
-    PipeEnd: TypeAlias = connection.PipeConnection
+    PipeEnd: TypeAlias = "connection.PipeConnection"
 else:
-    PipeEnd: TypeAlias = connection.Connection
+    PipeEnd: TypeAlias = "connection.Connection"
 
 _GRACE_S = 2.0  # to clear away half-written copies, on a busy computer too
 _asked = threading.Event()
