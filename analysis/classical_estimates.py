@@ -35,7 +35,7 @@ class ClassicalEstimates:
     log_decrement: float | None
     log_decrement_uncertainty: float | None
     cycles: int  # full cycles of the tail
-    residual_displacement_m: Floats  # u_s simulated at each of `SCANNED`, the other parameters as fitted
+    residual_displacement_m: Floats  # simulated u_s at `FRICTION_GRID`, the others as fitted
     friction_candidates: tuple[float, ...]
     """Every f_d of the scanned range whose simulated u_s is the measured one; empty where that is unknown."""
     friction_by_paper_method: float | None

@@ -94,7 +94,7 @@ class LiveState:
     friction_dynamic_plate: Quantity | None = None  # from the plate alone, before that
     narrowing: tuple[str, ...] = (FRICTION, PERIOD, DAMPING)
     """Which of these three readings until 20 s after the release would still narrow by more than a twentieth
-    of their standard uncertainty (`analysis.live`)."""
+    of their standard uncertainty (`analysis.stopping_rule`)."""
     may_stop: bool = False
     """True once slip has ended, the law is adequate, and waiting does not narrow f_d (where nothing slips:
     neither of the others)."""

@@ -20,8 +20,8 @@ _SCATTER_MAX = 1.0 / 3.0  # of the size, between runs: with more, not even the s
 _SCATTER_MAX_OF = {"second_mode_frequency_hz": 0.1, "base_frequency_hz": 0.2}
 """The same of frequencies: modes that differ by more are others; that of a base is known less well."""
 _SIGMAS = 6.2
-"""Standard uncertainties of a size from which on an effect is named: the BIC falls by 30 (`identify`) if
-chi-square falls by 38, a parameter costing the logarithm of some 4,000 readings."""
+"""Standard uncertainties of a size that no run fails to show: the BIC falls by 30, where 10 suffice for an
+effect to stay, if chi-square falls by 38, a parameter costing the logarithm of some 4,000 readings."""
 
 
 class EffectScope(StrEnum):
