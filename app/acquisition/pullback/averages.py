@@ -12,6 +12,7 @@ from drivers.arrays import Floats
 BIN_S = 0.002  # length of a short average: a longer one has less noise, and a release is noticed later
 _KEPT_S = 1.6  # a release is confirmed within 1.5 s, and then dated by the readings about its beginning
 _PARTS = 4  # a stretch is compared in quarters: their means differ if it moves
+_LEAST_READINGS = 2 * _PARTS  # of a stretch
 _START_GRID = 200  # trial beginnings of the parabola over the stretch
 _NORMAL_MEDIAN = 0.6744897501960817  # median of |x| for a standard normal x
 _RESOLUTION_M = 0.5e-6  # least value of the noise: readings of a coarse or quiet gauge repeat exactly
@@ -117,7 +118,17 @@ class SlidingWindow:
         return mean_m(rows) if is_current else math.nan
 
     def stationary(self, duration_s: float, tolerance_m: float) -> StationaryLevel | None:
-        return stationary_level(self.latest(duration_s), duration_s * self._rate_hz, tolerance_m)
+        """Level of the last `duration_s`, or of the last eight readings where it has fewer; None if it moved.
+
+        These may take twice as long as at the nominal rate: slow devices leave readings out too.
+        """
+        span = duration_s * self._rate_hz
+        stretch = self.latest(duration_s)
+        if len(stretch) < _LEAST_READINGS:
+            stretch = self._all()[-_LEAST_READINGS:]
+            if len(stretch) and stretch[-1, 0] - stretch[0, 0] > 2.0 * max(span, _LEAST_READINGS):
+                return None
+        return stationary_level(stretch, span, tolerance_m)
 
     def drift_m_per_s(self, duration_s: float, bound_m_per_s: float, noise: float | None = None) -> float:
         """Rate of drift; 0 as long as that is within a bound, or hidden in the noise (m), where known."""
@@ -156,7 +167,7 @@ def noise_m(values_m: Floats) -> float:
 
 def stationary_level(stretch: Floats, span: float, tolerance_m: float) -> StationaryLevel | None:
     """Level of a stretch (n, 2) whose quarters agree within six standard errors; None if it moved."""
-    if len(stretch) < 2 * _PARTS or stretch[-1, 0] - stretch[0, 0] < 0.9 * span:
+    if len(stretch) < _LEAST_READINGS or stretch[-1, 0] - stretch[0, 0] < 0.9 * span:
         return None
     values = stretch[:, 1]
     edges = [len(values) * part // _PARTS for part in range(_PARTS + 1)]
@@ -173,7 +184,7 @@ def stationary_level(stretch: Floats, span: float, tolerance_m: float) -> Statio
 
 def drift(stretch: Floats, noise: float | None = None) -> tuple[float, float]:
     """Slope of a stretch (n, 2) by least squares, and its standard error: infinite below eight readings."""
-    if len(stretch) < 2 * _PARTS:
+    if len(stretch) < _LEAST_READINGS:
         return 0.0, math.inf
     index = stretch[:, 0] - stretch[:, 0].mean()
     spread = float(index @ index)

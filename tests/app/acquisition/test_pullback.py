@@ -1,6 +1,7 @@
 """The pullback state machine on simulated motions, and on pullbacks with mistakes."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,20 @@ def test_works_from_100_hz_to_100_khz(rate_hz):
     assert states(turns) == [*TO_RELEASE, State.SLIPPING]
     assert test.measurement.release_confirmed
     assert abs(test.measurement.release_index / rate_hz - TIMETABLE.release_s) <= max(0.001, 1.01 / rate_hz)
+
+
+@pytest.mark.parametrize("lost", [0.0, 0.1])
+@pytest.mark.parametrize("rate_hz", [12.0, 16.0, 20.0, 25.0, 30.0, 34.0, 49.0])
+def test_a_device_that_is_read_slowly_needs_a_longer_hold_and_is_armed(rate_hz, lost):
+    timetable = replace(TIMETABLE, rest_s=3.0, hold_s=3.0)
+    table, relative = recording(rate_hz, timetable.release_s + 1.0, noise_m=10e-6, timetable=timetable)
+    gone = np.random.default_rng(1).random(len(table)) < lost
+    table[gone] = relative[gone] = np.nan
+    test, turns, _ = follow(PullbackPlan(rate_hz, 0.012), table, relative)
+    found = states(turns)
+    assert found[found.index(State.RELEASED) - 1] is State.ARMED
+    assert test.measurement.release_confirmed
+    assert abs(test.measurement.release_index / rate_hz - timetable.release_s) <= 2.0 / rate_hz
 
 
 @given(block=st.integers(1, 400), lost=st.floats(0.0, 0.3), seed=st.integers(0, 50))
