@@ -182,7 +182,7 @@ class SampleSource(ABC):
         """Read until all is good, or for `timeout_s` of running time; returns it and whether it is good.
 
         All is examined after each read that brings data. With `growth` it is examined when it has grown by
-        that share, and when a read brings nothing.
+        that share, when a read brings nothing, and at the end.
         """
         received, examined, now_s = b"", 0, time.perf_counter()
         deadline_s = now_s + max(timeout_s, _MIN_WAIT_S)
@@ -196,7 +196,7 @@ class SampleSource(ABC):
             before_s, now_s = now_s, time.perf_counter()
             if now_s - before_s > _STALL_S:
                 deadline_s += now_s - before_s
-        return received, False
+        return received, len(received) > examined and bool(is_good(received))
 
     def await_stream(
         self, link: Link, is_good: Callable[[bytes], object], timeout_s: float, growth: float = 0.0

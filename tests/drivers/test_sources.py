@@ -42,3 +42,12 @@ def test_data_that_grow_no_more_are_examined_once():
     source = find_driver("csv").make_source({}, 100.0)
     source.await_data(link, 0.1, lambda data: examined.append(len(data)), 2.0)
     assert examined == [50, 110]
+
+
+def test_what_has_come_until_the_time_is_over_is_examined() -> None:
+    link = ScriptedLink(lambda _: b"")
+    link.read = lambda: b"x"  # type: ignore[method-assign]
+    source = find_driver("csv").make_source({}, 100.0)
+    received, good = source.await_data(link, 0.1, lambda data: len(data) > 1, 1e9)
+    assert good
+    assert len(received) > 2

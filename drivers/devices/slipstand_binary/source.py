@@ -89,10 +89,8 @@ class SlipstandBinarySource(SampleSource):
         return confirmed
 
     def _await_frames(self, link: Link, timeout_s: float, *, measure: bool) -> bytes:
-        if measure:
-            received = self.await_stream(link, codec.rate_from_frames, timeout_s, RATE_GROWTH)
-        else:
-            received = self.await_stream(link, codec.has_frame, timeout_s)
+        wanted, growth = (codec.rate_from_frames, RATE_GROWTH) if measure else (codec.has_frame, 0.0)
+        received = self.await_stream(link, wanted, timeout_s, growth)
         rate_hz = codec.rate_from_frames(received) if measure else None
         if not self.is_same_rate(rate_hz):
             template = N_(
