@@ -7,6 +7,9 @@ of all is then made of those summaries, and the rest is measured on all files. P
 `--analyse 1000,100000`: so many of the runs are analysed and saved on a Dask cluster of two workers, of which
 one is killed after a tenth of the runs, and the other stopped for half of each second. Then a hundredth of
 the runs is new, and a second pass analyses these alone. Times by the clock.
+
+`--incremental 10000,100000`: so many runs, of which a hundredth is new and the others hold a result, are
+given to `slipstand analyze --save --only-new` on such a cluster. Times by the clock, from the start of it.
 """
 
 import argparse
@@ -14,10 +17,13 @@ import os
 import resource
 import signal
 import statistics
+import subprocess
 import sys
 import tempfile
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
@@ -29,7 +35,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from app.runs import listing
 from app.runs.analysis_request import AnalysisRequest
 from app.runs.batch.executors import ExecutorOptions, open_executor
-from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs
+from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_one, analyze_runs
 from app.runs.listing import list_runs
 from app.runs.run_filter import RunFilter
 from app.runs.simulated import write_simulated_run
@@ -41,6 +47,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--runs", default="10000,100000")
     parser.add_argument("--analyse", help="numbers of runs to analyse; nothing is listed then")
+    parser.add_argument(
+        "--incremental", help="numbers of runs of which a hundredth is new; nothing else is done"
+    )
     chosen = parser.parse_args()
     print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores")
     if chosen.analyse:
@@ -49,6 +58,14 @@ def main() -> None:
         for count in map(int, chosen.analyse.split(",")):
             with tempfile.TemporaryDirectory() as place:
                 print(analysed(Path(place) / "library", count), flush=True)
+        return
+    if chosen.incremental:
+        print("| runs | analysed | failed | until the new runs are known, s | until they are analysed, s |")
+        print("|---|---|---|---|---|")
+        for count in map(int, chosen.incremental.split(",")):
+            with tempfile.TemporaryDirectory() as place:
+                os.environ["XDG_CACHE_HOME"] = f"{place}/cache"
+                print(incremental(Path(place) / "library", count), flush=True)
         return
     print("| runs | first listing, scaled | listed | filtered | one changed | index | memory, MB |")
     print("|---|---|---|---|---|---|---|")
@@ -64,16 +81,12 @@ def row(library: Path, count: int) -> str:
     part = library / "00"
     first_s, found = timed(lambda: list_runs(part))
     first_s *= count / len(found)
-    model = found[0]
-    stamp = (files[0].stat().st_size, files[0].stat().st_mtime_ns)
-    index = {str(path): (stamp, msgspec.structs.replace(model, path=str(path))) for path in files}
-    listing._save_index(library, index)
-    del index
+    save_index(library, files)
     listed_s = statistics.median(timed(lambda: list_runs(library))[0] for _ in range(REPEATS))
     filtered = RunFilter(series="1FFM0", text="simulated")
     filtered_s = statistics.median(timed(lambda: list_runs(library, filtered))[0] for _ in range(REPEATS))
     files[-1].unlink()
-    write_simulated_run(files[-1], parameters().simulate(5.0), parameters(), series="1FFM0", rate_hz=200.0)
+    write_run(files[-1])
     changed_s, _ = timed(lambda: list_runs(library))
     size = listing.index_path(library).stat().st_size
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -84,18 +97,53 @@ def row(library: Path, count: int) -> str:
 def analysed(library: Path, count: int) -> str:
     """Analyse a library of so many runs twice, the first time with a worker killed and one slow."""
     files = fill(library, count)
-    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
-        with Client(cluster.scheduler_address, set_as_default=False) as client:
-            killed, slow = client.run(os.getpid).values()
-        first_s, outcomes = one_pass(files, cluster.scheduler_address, Disturbance(killed, slow, count // 10))
+    with open_cluster() as (address, killed, slow):
+        first_s, outcomes = one_pass(files, address, Disturbance(killed, slow, count // 10))
         for file in files[::100]:  # as a run that was recorded since
             file.unlink()
-            write_simulated_run(file, parameters().simulate(5.0), parameters(), series="1FFM0", rate_hz=200.0)
-        again_s, again = one_pass(files, cluster.scheduler_address)
+            write_run(file)
+        again_s, again = one_pass(files, address)
     failed = sum(bool(outcome.error) for outcome in (*outcomes, *again))
     anew = sum(not outcome.up_to_date for outcome in again)
     first, second = (f"{took_s:.0f} | {took_s / count * 1e3:.0f}" for took_s in (first_s, again_s))
     return f"| {count} | {first} | {failed} | {second} | {anew} |"
+
+
+def incremental(library: Path, count: int) -> str:
+    """Analyse the new runs of a library of so many, with a worker killed and one slow."""
+    files = fill(library, count, with_result=True)
+    save_index(library, files)
+    new = files[::100]
+    for file in new:
+        file.unlink()
+        write_run(file)
+    failed = analysed = 0
+    with open_cluster() as (address, killed, slow):
+        disturbance = Disturbance(killed, slow, len(new) // 10)
+        began_s = time.perf_counter()
+        command = [sys.executable, "-m", "app", "analyze", library, "--save", "--only-new", "--dask", address]
+        with subprocess.Popen(
+            [*command, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        ) as process:
+            process.stderr.readline()  # how many are up to date
+            known_s = time.perf_counter() - began_s
+            for line in process.stdout:
+                failed += line.startswith(b'    "error":')
+                if line.startswith(b'    "run":'):
+                    analysed += 1
+                    disturbance.on_run(analysed)
+        took_s = time.perf_counter() - began_s
+        disturbance.end()
+    return f"| {count} | {analysed} | {failed} | {known_s:.1f} | {took_s:.1f} |"
+
+
+@contextmanager
+def open_cluster() -> Iterator[tuple[str, int, int]]:
+    """Address of a Dask cluster of two workers, and the numbers of their processes."""
+    with LocalCluster(n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster:
+        with Client(cluster.scheduler_address, set_as_default=False) as client:
+            first, second = client.run(os.getpid).values()
+        yield cluster.scheduler_address, first, second
 
 
 class Disturbance:
@@ -143,7 +191,20 @@ def one_pass(
     return time.perf_counter() - began_s, outcomes
 
 
-def fill(library: Path, count: int) -> list[Path]:
+def save_index(library: Path, files: list[Path]) -> None:
+    """Make the index of all files by the summary of one."""
+    (model, *_) = list_runs(files[0].parent)
+    stamp = (files[0].stat().st_size, files[0].stat().st_mtime_ns)
+    index = {str(path): (stamp, msgspec.structs.replace(model, path=str(path))) for path in files}
+    listing._save_index(library, index)
+
+
+def write_run(path: Path) -> None:
+    """Write a short run without a result."""
+    write_simulated_run(path, parameters().simulate(5.0), parameters(), series="1FFM0", rate_hz=200.0)
+
+
+def fill(library: Path, count: int, *, with_result: bool = False) -> list[Path]:
     """Paths of hard links to one short run: a file system takes some ten thousand links of a file."""
     files: list[Path] = []
     for number in range(count):
@@ -151,7 +212,9 @@ def fill(library: Path, count: int) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"run_{number:06d}.h5"
         if number % 20_000 == 0:
-            write_simulated_run(path, parameters().simulate(5.0), parameters(), series="1FFM0", rate_hz=200.0)
+            write_run(path)
+            if with_result:
+                analyze_one(AnalysisTask(str(path), save=True))
             os.utime(path, ns=(10**18, 10**18))
         else:
             os.link(files[number // 20_000 * 20_000], path)

@@ -477,6 +477,7 @@ SCHEMAS: Final[dict[str, tuple[str, Schema]]] = {
                     "analyses": COUNT,
                     "damaged_analyses": COUNT,
                     "stale": YES,
+                    "valid_requests": listed(TEXT, "Hash of each request whose saved result is valid."),
                     "adequate": optional(YES),
                     "friction_holds": YES,
                     "identifier": TEXT,

@@ -24,7 +24,7 @@ from app.runs.analysis_request import AnalysisRequest
 from app.runs.analyze import REFITS_MAX, REFITS_MIN, Analysis, analyze_run
 from app.runs.batch.executors import ExecutorOptions, open_executor
 from app.runs.batch.tasks import AnalysisOutcome, AnalysisTask, analyze_runs, build_outcome
-from app.runs.listing import resolve_run_files
+from app.runs.listing import list_runs, resolve_run_files
 from messages.message import message
 
 MODELS = ("auto", *(law.name for law in LAWS))
@@ -34,6 +34,12 @@ def analyze(options: AnalyzeOptions) -> None:
     request, executor = _request(options), executor_options(options.jobs)
     paths = resolve_run_files(options.runs)
     options.added.check(request.kind, len(paths))
+    if options.only_new:
+        paths = _without_analysed(paths, request, options)
+        if not paths:
+            if options.as_json:
+                out.print_json([])
+            return
     if options.figure and len(paths) > 1:
         raise CommandError(
             f"--figure {options.figure} is one file for {len(paths)} runs. Analyse them one by one"
@@ -58,6 +64,22 @@ def analyze(options: AnalyzeOptions) -> None:
                 add(document)
     if failed:
         raise typer.Exit(1)
+
+
+def _without_analysed(paths: list[Path], request: AnalysisRequest, options: AnalyzeOptions) -> list[Path]:
+    """Leave out runs of folders whose result is valid by the index of their folder. Raises CommandError."""
+    if options.anew or options.added.added_mass is not None:
+        other = "--anew" if options.anew else "--added-mass"
+        raise CommandError(f"--only-new leaves out runs that {other} needs. Give one of the two")
+    analysed: set[str] = set()
+    for folder in map(Path.expanduser, options.runs):
+        if folder.is_dir():
+            with out.progress_bar("looking at new files", total=1.0) as update:
+                found = list_runs(folder, progress=lambda done, count: update(done / count))
+            analysed.update(run.path for run in found if request.key in run.valid_requests)
+    new = [path for path in paths if str(path) not in analysed]
+    out.print_status(f"{len(paths) - len(new)} of {len(paths)} runs are up to date")
+    return new
 
 
 def _with_table_mass(

@@ -79,6 +79,7 @@ class AnalyzeOptions:
     added: AddedMassOptions
     save: bool = flag("--save", "Keep the result in the run, unless the same is kept already.")
     anew: bool = flag("--anew", "With --save: analyse and keep the result in any case.")
+    only_new: bool = flag("--only-new", "Leave out runs of a folder that hold a valid result.")
     figure: Path | None = option("--figure", "Draw record and simulation: PNG, SVG or PDF, of one run.")
     jobs: JobOptions
     force: bool = shared.force()

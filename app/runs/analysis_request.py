@@ -75,6 +75,11 @@ class AnalysisRequest(msgspec.Struct, frozen=True):
         """Hash of `given`: the same for requests that ask for the same, whichever version made them."""
         return content_hash(self.given)
 
+    @property
+    def key(self) -> str:
+        """Hash of all fields: the same for equal requests."""
+        return content_hash(msgspec.to_builtins(self))
+
     def command(self, run: Path) -> str:
         """Command that gives the results of this request on a run, to the last digit."""
         given = self.given.items()

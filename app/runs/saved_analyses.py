@@ -307,6 +307,15 @@ def _cell(value: Any) -> Any:
     return value if isinstance(value, str) else math.nan if value is None else float(value)
 
 
+def is_stale(file: h5py.File, metadata: RunMetadata, saved: SavedAnalysis) -> bool:
+    """Tell whether masses, pullback, calibration or clock of the run changed since.
+
+    Raises DamagedRunError.
+    """
+    masses = {name: saved.settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
+    return saved.metadata_hash != metadata_hash(file, metadata, **masses)
+
+
 def metadata_hash(file: h5py.File, metadata: RunMetadata | None = None, **masses_kg: float | None) -> str:
     """Hash of all that an analysis takes of a run beside its samples. Raises DamagedRunError.
 

@@ -4,10 +4,11 @@ import h5py
 
 from analysis.identification import Degree
 from app.runs import schema
+from app.runs.analysis_request import AnalysisRequest
 from app.runs.columns import stored_rows
 from app.runs.fields import read_text
 from app.runs.metadata_io import read_identifier, read_metadata
-from app.runs.saved_analyses import metadata_hash, read_all_analyses
+from app.runs.saved_analyses import is_stale, read_all_analyses
 from app.runs.summary import RunSummary
 
 _OF_METADATA = (
@@ -21,6 +22,8 @@ def summarize_file(file: h5py.File) -> RunSummary:
     metadata = read_metadata(file)
     rows = stored_rows(file)
     analyses, damaged = read_all_analyses(file)
+    valid = [saved for saved in analyses if not is_stale(file, metadata, saved)]
+    requests = (AnalysisRequest.of_settings(saved.settings) for saved in valid)
     results = analyses[-1].document["results"] if analyses else {}
     friction, period, damping = (
         results.get(name, {}) for name in ("friction_dynamic", "period_s", "damping_n1_per_s")
@@ -42,7 +45,8 @@ def summarize_file(file: h5py.File) -> RunSummary:
         period_uncertainty_s=period.get("standard_uncertainty"),
         damping_n1_per_s=damping.get("value"),
         damping_n1_uncertainty_per_s=damping.get("standard_uncertainty"),
-        stale=bool(analyses) and analyses[-1].metadata_hash != metadata_hash(file, metadata),
+        stale=bool(analyses) and (not valid or valid[-1] is not analyses[-1]),
+        valid_requests=tuple(dict.fromkeys(request.key for request in requests if request is not None)),
         adequate=model.get("adequate"),
         friction_holds=model.get("degree") == Degree.FRICTION.value,
         identifier=read_identifier(file),

@@ -41,6 +41,8 @@ class RunSummary(msgspec.Struct, frozen=True, gc=False):
     damping_n1_uncertainty_per_s: float | None = None
     stale: bool = False
     """Masses, calibration or pullback have been changed since the newest saved analysis."""
+    valid_requests: tuple[str, ...] = ()
+    """Requests of the saved analyses that are not stale, see `AnalysisRequest.key`."""
     adequate: bool | None = None  # whether its model fits; None where it has none
     friction_holds: bool = False  # it does not, but independent estimates of f_d agree
     identifier: str = ""  # UUID given when it was recorded: the same under every name

@@ -16,7 +16,7 @@ from app.runs.fields import read_text
 from app.runs.metadata import RunMetadata
 from app.runs.metadata_io import read_identifier, read_metadata
 from app.runs.reader import check_openable, read_file
-from app.runs.saved_analyses import Document, SavedAnalysis, metadata_hash, read_all_analyses
+from app.runs.saved_analyses import Document, SavedAnalysis, is_stale, read_all_analyses
 from app.runs.schema import ENDED
 from app.runs.validator import Validator, shared_validator
 from config.schema import ConfigError
@@ -98,8 +98,7 @@ def latest_valid_in_file(
     for saved in reversed(analyses):
         if not wanted(saved):
             continue
-        masses = {name: saved.settings.get(name) for name in ("table_mass_kg", "plate_mass_kg")}
-        if saved.metadata_hash == metadata_hash(file, metadata, **masses):
+        if not is_stale(file, metadata, saved):
             check_samples(file)
             return saved, stale, damaged
         stale = True

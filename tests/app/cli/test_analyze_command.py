@@ -1,5 +1,6 @@
 """`slipstand analyze` and `runs`: many runs, saved results, records that cannot be identified."""
 
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +110,50 @@ def test_saved_results_stand_beside_earlier_ones(slipstand: Any, simulated_run: 
     (listed,) = slipstand("runs", simulated_run.parent, "--json").json
     assert listed["analyses"] == 2
     assert listed["friction_dynamic"] == pytest.approx(0.1, rel=0.01)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two runs without results, one of them in a folder below."""
+    for name in ("first.h5", "below/second.h5"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        simulate(SimulateOptions(motion=MotionOptions(series="1FFM0"), output=tmp_path / name, rate=200.0))
+    return tmp_path
+
+
+def analysed(outcome: Any) -> list[str]:
+    """Names of the runs of which results were printed as JSON."""
+    assert outcome.code == 0
+    return [Path(document["run"]).name for document in outcome.json]
+
+
+def test_only_new_runs_are_analysed(slipstand: Any, folder: Path) -> None:
+    again = ("analyze", folder, "--save", "--only-new", "--model", "coulomb", "--json")
+    assert analysed(slipstand(*again)) == ["second.h5", "first.h5"]
+
+    outcome = slipstand(*again)
+    assert analysed(outcome) == []
+    assert outcome.err == "2 of 2 runs are up to date\n"
+
+    shutil.copy(folder / "first.h5", folder / "third.h5")
+    slipstand("edit", folder / "first.h5", "--plate-mass", 23)
+    assert analysed(slipstand(*again)) == ["first.h5"]
+    other = (*again[:-2], "static", "--json")
+    assert analysed(slipstand(*other)) == ["second.h5", "first.h5", "third.h5"]
+    assert analysed(slipstand("analyze", folder / "first.h5", *again[2:])) == ["first.h5"]
+
+
+def test_only_new_runs_without_any_print_nothing(slipstand: Any, folder: Path) -> None:
+    assert slipstand("analyze", folder, "--save", "--model", "coulomb").code == 0
+    outcome = slipstand("analyze", folder, "--save", "--only-new", "--model", "coulomb")
+    assert (outcome.code, outcome.out) == (0, "")
+
+
+@pytest.mark.parametrize("other", [("--anew",), ("--added-mass", 1, "--kind", "one-mass")])
+def test_only_new_is_refused_with_what_needs_all_runs(
+    slipstand: Any, folder: Path, other: tuple[object, ...]
+) -> None:
+    assert_one_error_line(slipstand("analyze", folder, "--save", "--only-new", *other), str(other[0]))
 
 
 def test_the_figure_is_drawn(slipstand: Any, simulated_run: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from runs_kit import ANALYSIS, ENDING, block, small_run
 
 import config
 from app.runs import listing as library_module
+from app.runs.analysis_request import AnalysisRequest
 from app.runs.edits import edit_run, undo_edit
 from app.runs.errors import RunNotFoundError, ValidationTimeoutError
 from app.runs.listing import find_run_files, index_path, list_runs
@@ -157,6 +158,30 @@ def test_stale_analyses_are_marked(folder):
     assert _stale(folder) == ["b.h5"]
     undo_edit(path, "Ada")
     assert _stale(folder) == []
+
+
+def test_requests_of_valid_analyses_are_listed(folder):
+    path = folder / "b.h5"
+    default, heavier = AnalysisRequest(), AnalysisRequest(plate_mass_kg=30.0)
+    for request in (default, heavier, default):
+        save_analysis(path, ANALYSIS, "hash", msgspec.to_builtins(request))
+    assert _valid_requests(folder) == {default.key, heavier.key}
+
+    edit_run(path, "Ada", plate_mass_kg=27.5)
+    assert _valid_requests(folder) == {heavier.key}
+    edit_run(path, "Ada", pullback_m=0.009)
+    assert _valid_requests(folder) == set()
+
+
+def test_an_analysis_with_another_mass_is_not_stale(folder):
+    settings = msgspec.to_builtins(AnalysisRequest(plate_mass_kg=30.0))
+    save_analysis(folder / "b.h5", ANALYSIS, "hash", settings)
+    assert _stale(folder) == []
+
+
+def _valid_requests(folder):
+    (found,) = (run for run in list_runs(folder) if run.path.endswith("b.h5"))
+    return set(found.valid_requests)
 
 
 def _stale(folder):
