@@ -100,11 +100,18 @@ class JournalFile:
                     self._remember(record)
                 return
 
-    def begin_sync(self) -> None:
-        """Begin a sync in a thread unless one is under way. Raises OSError where no folder takes it."""
-        if self._is_made and (self._sync is None or not self._sync.is_alive()):
-            self._finish_sync()
-            self._sync = FileSync(self._file.fileno())
+    def begin_sync(self) -> bool:
+        """Begin a sync in a thread unless one is under way; returns whether nothing waits for another.
+
+        Raises OSError where no folder takes it.
+        """
+        if not self._is_made:
+            return True
+        if self._sync is not None and self._sync.is_alive():
+            return False
+        self._finish_sync()
+        self._sync = FileSync(self._file.fileno())
+        return True
 
     def sync(self) -> None:
         """Wait until all is on disk. Raises OSError where no folder takes it."""

@@ -9,6 +9,7 @@ the journal before anything is decoded.
 
 import contextlib
 import logging
+import math
 import queue
 import threading
 import time
@@ -153,15 +154,13 @@ class Journal:
         self._thread.start()
 
     def _write(self, first: bytes | None) -> None:
-        """Thread: append records and sync each tenth of a second, until the end is queued."""
+        """Thread: append records and sync them, until the end is queued."""
         file = self._file
         try:
             if first is not None:
                 self._do(first)
-            while not self._is_ending and self._write_for(self._SYNC_S):
-                pass
-            if self._is_ending:
-                self._do(b"")
+            self._write_records()
+            self._do(b"")
             self._file.close()
         except _LeftError:
             _close(file)
@@ -180,19 +179,30 @@ class Journal:
         self._is_ending = record is None
         return record
 
-    def _write_for(self, duration_s: float) -> bool:
-        record = self._next()
-        deadline = time.perf_counter() + duration_s
-        while record is not None:
-            self._do(record)
+    def _write_records(self) -> None:
+        """Append records until the end is queued; each is synced within a tenth of a second.
+
+        A sync begins after a record where the last one began long enough before: waiting for the time at
+        which it is due would wake this thread up once more.
+        """
+        now_s = begun_s = time.perf_counter()
+        due_s = math.inf
+        while True:
             try:
-                record = self._next(max(0.0, deadline - time.perf_counter()))
+                record = self._next(None if due_s == math.inf else max(0.0, due_s - now_s))
             except queue.Empty:
-                break
-        if record is None:
-            return False
-        self._file.begin_sync()
-        return True
+                pass
+            else:
+                if record is None:
+                    return
+                self._do(record)
+            now_s = time.perf_counter()
+            due_s = min(due_s, now_s + self._SYNC_S)
+            if now_s >= min(due_s, begun_s + self._SYNC_S):
+                if self._file.begin_sync():
+                    begun_s, due_s = now_s, math.inf
+                else:
+                    due_s = now_s + self._SYNC_S
 
     def _do(self, record: bytes) -> None:
         """Append a record; an empty one syncs. Raises OSError, _LeftError once another thread does it."""
