@@ -115,6 +115,31 @@ def test_a_slow_disk_holds_no_record_up(tmp_path, monkeypatch):
     journal.remove()
 
 
+def test_what_comes_during_a_slow_sync_is_synced_after_it(tmp_path, monkeypatch):
+    may_end, begun = threading.Event(), list[int]()
+    path = tmp_path / "run.journal"
+
+    def slow_sync(_descriptor):
+        begun.append(len(list(read_journal(path))))
+        may_end.wait(PATIENCE_S)
+
+    may_end.set()
+    monkeypatch.setattr(Journal, "_SYNC_S", 0.01)
+    journal = create_journal(path, header())
+    monkeypatch.setattr("app.acquisition.journal.file.os.fsync", slow_sync)
+    may_end.clear()
+    journal.append(b"first", 1)
+    wait_until(lambda: begun == [2])
+    journal.append(b"second", 2)
+    wait_until(lambda: len(list(read_journal(path))) == 3)
+    time.sleep(0.05)  # its own sync has been due for a while
+    assert begun == [2]
+    may_end.set()
+    wait_until(lambda: begun == [2, 3])
+    journal.close()
+    journal.remove()
+
+
 def test_what_becomes_known_stands_between_the_bytes(tmp_path):
     path = tmp_path / "run.journal"
     journal = create_journal(path, header())
