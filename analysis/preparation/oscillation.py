@@ -26,6 +26,9 @@ _HELD_S = 0.1
 """A table slower than `_SLOW`, relative to its fastest, for longer than this is held: no turn lasts."""
 _PLATEAU_MAX_S = 1.0
 _PLATEAU_MIN_S = 0.05
+_HELD_LAST_S = 0.15
+_HELD_READINGS = 5
+"""A hold is judged by its last 0.15 s, or where these are few by the last five readings of twice the time."""
 _STILL = 0.005  # share of the widest swing that hum may move a table that is held
 _CHANCE = 4.0
 """A median distance of n readings exceeds that of many by more than this over sqrt(n) only once in 10,000."""
@@ -224,8 +227,9 @@ def _hold_begin(table: Channel, rise: int, scatter_max_m: float) -> int | None:
     """First sample of the hold that ends shortly before sample `rise`; None where the table is not still."""
     t, x = table.time_s, table.value_m
     end = int(np.searchsorted(t, t[rise] - _RISE_LAG_S))
-    last = x[int(np.searchsorted(t, t[end] - 0.15)) : end]
-    if len(last) < 5:
+    usual, earliest = np.searchsorted(t[:end], (t[end] - _HELD_LAST_S, t[end] - 2.0 * _HELD_LAST_S))
+    last = x[min(usual, max(earliest, end - _HELD_READINGS)) : end]
+    if len(last) < _HELD_READINGS:
         return None
     level = float(np.median(last))
     scatter = 1.4826 * float(np.median(np.abs(last - level)))
@@ -233,8 +237,8 @@ def _hold_begin(table: Channel, rise: int, scatter_max_m: float) -> int | None:
     start = int(away[-1]) + 1 if len(away) else 0
     start += _unsettled(Channel(t[start:end], x[start:end]), scatter)
     by_chance = 1.0 + _CHANCE / float(np.sqrt(len(last)))
-    still = scatter <= by_chance * scatter_max_m and t[end] - t[start] >= _PLATEAU_MIN_S and end - start >= 5
-    return start if still else None
+    is_long = t[end] - t[start] >= _PLATEAU_MIN_S and end - start >= _HELD_READINGS
+    return start if is_long and scatter <= by_chance * scatter_max_m else None
 
 
 def _unsettled(hold: Channel, scatter_m: float) -> int:

@@ -33,6 +33,22 @@ def test_release_is_found_to_some_milliseconds(rate_hz, noise_m):
     assert release.end_s == pytest.approx(table.time_s[-1], abs=0.05)
 
 
+@pytest.mark.parametrize("rate_hz", [31.0, 33.0, 40.0, 50.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_a_hold_is_found_in_few_readings_of_which_some_are_missing(rate_hz, seed):
+    table, _ = channels(Truth(rate_hz=rate_hz, noise_m=2e-5, duration_s=5.0, seed=seed))
+    kept = np.random.default_rng(seed).random(len(table)) > 0.1
+    late = np.flatnonzero((table.time_s > 0.86) & (table.time_s < 1.0))
+    kept[late[::2]] = False  # half of the last tenth of a second of the hold
+
+    (release,) = find_releases(Channel(table.time_s[kept], table.value_m[kept]))
+
+    assert release.time_s == pytest.approx(1.0, abs=2.0 / rate_hz)
+    assert release.plateau_start_s is not None
+    assert release.plateau_start_s < 0.6
+    assert release.level_m == pytest.approx(0.0123, abs=3e-5)
+
+
 def test_hold_is_told_from_the_rest_and_the_pull_before_it():
     table, _ = channels(Truth(pull_s=2.0, duration_s=5.0))
 
