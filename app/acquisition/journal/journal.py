@@ -186,7 +186,7 @@ class Journal:
         which it is due would wake this thread up once more.
         """
         now_s = begun_s = time.perf_counter()
-        due_s = math.inf
+        due_s = now_s + self._SYNC_S  # for a record that another thread could not append
         while True:
             try:
                 record = self._next(None if due_s == math.inf else max(0.0, due_s - now_s))
