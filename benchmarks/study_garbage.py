@@ -116,7 +116,11 @@ def spoiled(seed: int) -> tuple[Record, tuple[str, ...], float]:
 
 def run(seed: int) -> Outcome:
     """Identify one spoiled record."""
-    made, names, friction = spoiled(seed)
+    return judged(seed, *spoiled(seed))
+
+
+def judged(seed: int, made: Record, names: tuple[str, ...], friction: float) -> Outcome:
+    """Identify a record with faults of these names, and hold f_d against the true one."""
     try:
         found = identify(made)
     except AnalysisError as error:

@@ -6,7 +6,14 @@ from scipy.stats import binom, chi2
 
 from analysis.fitting.problem import GaussNewton
 from analysis.laws.catalogue import FALLBACK_LAWS
-from benchmarks import study_coverage, study_garbage, study_live, study_one_mass, study_wrong_models
+from benchmarks import (
+    study_coverage,
+    study_garbage,
+    study_live,
+    study_one_mass,
+    study_slow_devices,
+    study_wrong_models,
+)
 
 SLOW_RATE_HZ = 450.0
 RECORDS = 36
@@ -84,6 +91,14 @@ def test_faulty_records_are_never_believed_when_wrong():
 def test_a_gauge_without_readings_of_the_first_slips_is_no_crash(seed):
     """Where other masses were looked for, nothing was left to fit."""
     assert study_garbage.run(seed).kind not in ("crash", "adequate, off")
+
+
+def test_slow_devices_give_f_d_where_a_tenth_of_the_readings_is_missing():
+    outcomes = [study_slow_devices.run(seed) for seed in range(RECORDS)]
+    enough = [outcome for outcome in outcomes if outcome.kind != "refused"]
+    assert all("readings a swing" in outcome.detail for outcome in outcomes if outcome not in enough)
+    assert not [outcome for outcome in enough if outcome.kind.endswith(("off", "crash"))]
+    assert at_least(sum(outcome.kind == "adequate, right" for outcome in enough), len(enough), 0.9)
 
 
 def test_a_record_without_hope_takes_no_more_work_than_others(monkeypatch):
