@@ -22,7 +22,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -53,26 +53,30 @@ def main() -> None:
     chosen = parser.parse_args()
     print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores")
     if chosen.analyse:
-        print("| runs | first pass, s | ms a run | failed | second pass, s | ms a run | analysed anew |")
-        print("|---|---|---|---|---|---|---|")
-        for count in map(int, chosen.analyse.split(",")):
-            with tempfile.TemporaryDirectory() as place:
-                print(analysed(Path(place) / "library", count), flush=True)
-        return
-    if chosen.incremental:
-        print("| runs | analysed | failed | until the new runs are known, s | until they are analysed, s |")
-        print("|---|---|---|---|---|")
-        for count in map(int, chosen.incremental.split(",")):
-            with tempfile.TemporaryDirectory() as place:
-                os.environ["XDG_CACHE_HOME"] = f"{place}/cache"
-                print(incremental(Path(place) / "library", count), flush=True)
-        return
-    print("| runs | first listing, scaled | listed | filtered | one changed | index | memory, MB |")
-    print("|---|---|---|---|---|---|---|")
-    for count in map(int, chosen.runs.split(",")):
+        print_rows(
+            chosen.analyse,
+            analysed,
+            "first pass, s | ms a run | failed | second pass, s | ms a run | analysed anew",
+        )
+    elif chosen.incremental:
+        print_rows(
+            chosen.incremental,
+            incremental,
+            "analysed | failed | until the new are known, s | until analysed, s",
+        )
+    else:
+        print_rows(
+            chosen.runs, row, "first listing, scaled | listed | filtered | one changed | index | memory, MB"
+        )
+
+
+def print_rows(counts: str, measure: Callable[[Path, int], str], header: str) -> None:
+    """Print a table with a row for each number of runs, each of a library of its own."""
+    print(f"| runs | {header} |\n{'|---' * (header.count('|') + 2)}|")
+    for count in map(int, counts.split(",")):
         with tempfile.TemporaryDirectory() as place:
             os.environ["XDG_CACHE_HOME"] = f"{place}/cache"
-            print(row(Path(place) / "library", count), flush=True)
+            print(measure(Path(place) / "library", count), flush=True)
 
 
 def row(library: Path, count: int) -> str:

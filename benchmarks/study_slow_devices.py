@@ -10,7 +10,8 @@ import numpy as np
 
 from analysis.record import Record
 from analysis.synthetic import simulate_record
-from benchmarks.studies import listed, options, percent, spread_out, table
+from benchmarks.studies import listed, options, percent, spread_out
+from benchmarks.studies import table as markdown_table
 from benchmarks.study_coverage import draw
 from benchmarks.study_garbage import KINDS, Outcome, judged
 
@@ -24,12 +25,11 @@ def slow_record(seed: int) -> tuple[Record, float]:
     truth, _ = draw(seed)
     hold_s = max(truth.hold_s, HOLD_MIN_S)
     made = simulate_record(truth.replace(rate_hz=float(rng.uniform(31.0, 60.0)), hold_s=hold_s))
-    gauges = [made.table_displacement_m.copy(), np.array(made.relative_displacement_m)]
-    for value in gauges:
+    table, relative = made.table_displacement_m.copy(), np.array(made.relative_displacement_m)
+    for value in (table, relative):
         value[rng.random(len(value)) < MISSING_SHARE] = np.nan
-    return made.replace(
-        table_displacement_m=gauges[0], relative_displacement_m=gauges[1]
-    ), truth.friction_dynamic
+    made = made.replace(table_displacement_m=table, relative_displacement_m=relative)
+    return made, truth.friction_dynamic
 
 
 def run(seed: int) -> Outcome:
@@ -46,7 +46,11 @@ def main() -> None:
     counts = Counter(outcome.kind for outcome in outcomes)
     late = [outcome.seed for outcome in outcomes if "release-not-recorded" in outcome.detail]
     print(f"### {len(outcomes)} records of 31 to 60 readings a second\n")
-    print(table(("outcome", "records"), [(kind, percent(counts[kind], len(outcomes))) for kind in KINDS]))
+    print(
+        markdown_table(
+            ("outcome", "records"), [(kind, percent(counts[kind], len(outcomes))) for kind in KINDS]
+        )
+    )
     print(f"\nRelease taken for one before the record, seeds: {listed(late)}")
     bad = [outcome.seed for outcome in outcomes if outcome.kind in ("adequate, off", "crash")]
     print(f"Seeds to look at: {listed(bad)}")

@@ -37,34 +37,43 @@ def test_least_squares_without_a_solution_are_one_line(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("period_s", "damping_ratio", "rate_hz", "hold_s"), [(0.84, 0.018, 40.0, 0.0), (0.46, 0.002, 50.0, 0.05)]
+    ("period_s", "frequency_ratio", "damping_ratio", "rate_hz", "hold_s"),
+    [(0.84, 0.91, 0.018, 40.0, 0.0), (0.46, 0.9, 0.002, 50.0, 0.05)],
 )
-def test_no_friction_is_believed_between_two_carts(period_s, damping_ratio, rate_hz, hold_s):
+def test_no_friction_is_believed_between_two_carts(period_s, frequency_ratio, damping_ratio, rate_hz, hold_s):
     """Without contact the fit took f_d 0.7 with a tilt of 0.5 rad, or an f_d of 0.7 that may be 0.
 
     The records begin too late to show how the first cart was held.
     """
-    found = identify(two_carts(period_s, damping_ratio, rate_hz, hold_s))
+    found = identify(two_carts(period_s, frequency_ratio, damping_ratio, rate_hz, hold_s))
     assert not {"friction_dynamic", "friction_static", "friction_dynamic_plate"} & found.results.keys()
     assert "implausible-result" in [warning.code for warning in found.warnings]
     assert found.model.degree is Degree.NONE
 
 
-@pytest.mark.parametrize(("period_s", "damping_ratio"), [(0.84, 0.018), (0.46, 0.002)])
+@pytest.mark.parametrize(
+    ("period_s", "frequency_ratio", "damping_ratio"), [(0.84, 0.91, 0.018), (0.46, 0.9, 0.002)]
+)
 @pytest.mark.parametrize("rate_hz", [30.0, 35.0, 60.0])
-def test_no_friction_is_believed_between_two_carts_of_which_one_was_held(period_s, damping_ratio, rate_hz):
-    found = identify(two_carts(period_s, damping_ratio, rate_hz, hold_s=2.0))
+def test_no_friction_is_believed_between_two_carts_of_which_one_was_held(
+    period_s, frequency_ratio, damping_ratio, rate_hz
+):
+    """Of the first an f_d is shown at some rates, beside the verdict that no model explains the record."""
+    found = identify(two_carts(period_s, frequency_ratio, damping_ratio, rate_hz, hold_s=2.0))
     codes = [warning.code for warning in found.warnings]
     assert "model-inadequate" in codes
     assert "release-not-recorded" not in codes
     assert found.model.degree is Degree.NONE
+    assert not found.model.adequate
+    if period_s == 0.46:
+        assert not {"friction_dynamic", "friction_static", "friction_dynamic_plate"} & found.results.keys()
 
 
-def two_carts(period_s, damping_ratio, rate_hz, hold_s):
+def two_carts(period_s, frequency_ratio, damping_ratio, rate_hz, hold_s):
     """Record of two carts with nearly the same period, the second half as heavy as the first."""
     return coupled_oscillators(
         period_s,
-        0.9,
+        frequency_ratio,
         0.5,
         (damping_ratio, damping_ratio),
         between="walls",

@@ -256,7 +256,8 @@ def review(desk: Desk, first: Path, home: Path) -> None:
     desk.wait(lambda: len(desk.rows()) == 2, "both runs")
     desk.click_at(desk.rows()[1]["place"], times=2)
     desk.wait(lambda: desk.title().startswith(f"{first.stem} "), "the run in the title")
-    desk.wait_for("Model fits")  # by which law is left to the noise of this recording
+    law = open_run(first).analyses[-1].document["model"]["name"]  # which one is left to the noise
+    desk.wait_for(f"{law.capitalize()} explains the record", "Model fits")
     desk.click("Export")
     desk.choose("Report as PDF…")
     desk.wait_for_field("QFileDialog")
