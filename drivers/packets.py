@@ -84,7 +84,7 @@ class PacketDecoder(Decoder):
 
     @property
     def losses(self) -> Losses:
-        losses = Losses(*(int(self._state[0][name]) for name in _LOSSES))
+        losses = Losses(*self._state[_LOSSES].item())
         if self._loss_estimator is not None:
             losses.missing_estimated += self._loss_estimator.lost
         return losses

@@ -75,7 +75,7 @@ class Decoder(ABC):
     @property
     @abstractmethod
     def losses(self) -> Losses:
-        """Counts until now."""
+        """Counts until now; later ones do not change what is returned."""
 
     @abstractmethod
     def feed(self, data: bytes, arrival_ns: int) -> Iterator[SampleBlock]:

@@ -84,7 +84,10 @@ class UncommittedRows:
         return [rows for rows in rest if len(rows)]
 
 
-_BATCH_S = 0.05  # rows are passed to the writer in batches: block by block costs several times as much
+_BATCH_S = 2.0
+_BATCH_ROWS = 1 << 14
+"""Rows are passed to the writer in batches of so long, or so many: a small batch costs as much as a large
+one. Until then they are in the journal; rows that it could not take are passed on at the end."""
 _CLOSING_S = 120.0
 _INSPECTION_S = 30.0  # for the run of a writer that gave no answer: its disk may hang
 _HANGING_S = 3.0  # for a writer whose disk is known to hang
@@ -131,7 +134,7 @@ class RunFile:
         self.path: Future[Path] = writer.open(request)
 
     def append_all(self, reads: Iterable[DecodedRead], end_index: int | None = None) -> None:
-        """Store the rows of several reads; raises the first RunError when all rows are counted."""
+        """Store the rows of several reads at once; raises the first RunError when all rows are counted."""
         failure: RunError | None = None
         for read in reads:
             try:
@@ -140,6 +143,7 @@ class RunFile:
                 failure = failure or error
         if failure is not None:
             raise failure
+        self._pass_on()
 
     def append(self, read: DecodedRead, end_index: int | None = None) -> None:
         """Store the rows of a read that come next, up to `end_index`. Raises RunError."""
@@ -151,7 +155,8 @@ class RunFile:
                 self.next_index = fresh.end_index
                 self._waiting.append(fresh)
         self.statistics.add_losses(read.losses)
-        if self._waiting and self.next_index - self._waiting[0].first_index >= _BATCH_S * self._rate_hz:
+        waiting = self.next_index - self._waiting[0].first_index if self._waiting else 0
+        if waiting >= min(_BATCH_S * self._rate_hz, _BATCH_ROWS) or self._writer.failure is not None:
             self._pass_on()
 
     def time_s(self, index: int | None) -> float | None:

@@ -71,7 +71,7 @@ class StoredRun(msgspec.Struct, frozen=True):
 
 def count_flags(status: NDArray[np.uint8]) -> Losses:
     """Counts of rows by their flags (n,)."""
-    if not status.any():
+    if not np.count_nonzero(status):  # takes a third of the time of `any`
         return Losses(samples=len(status))
     overload = SampleStatus.OVERLOAD_TABLE | SampleStatus.OVERLOAD_RELATIVE
     return Losses(
@@ -119,7 +119,7 @@ class CalibratedBlock:
 def calibrate(block: SampleBlock, gauges: Gauges) -> CalibratedBlock:
     """Samples of a block in metres."""
     readings = np.empty((len(block), 2))
-    is_flagged = block.status.any()
+    is_flagged = np.count_nonzero(block.status) > 0
     for channel, gauge in enumerate((gauges.table, gauges.relative)):
         readings[:, channel] = gauge.displacement_m(block.counts[:, channel].astype(np.float64))
         if is_flagged:

@@ -93,23 +93,28 @@ class FrameDecoder:
 
     def __init__(self) -> None:
         self._layout = BlockLayout()
-        self._rest = bytearray()
+        self._parts: list[bytes] = []
+        self._size = 0  # bytes of all parts
+        self._wanted = _FRAME.size  # with so many bytes, there is something to decode
 
     def feed(self, data: bytes) -> Iterator[WriterCommand]:
         """Yield the commands that `data` completes. Raises ValueError, msgspec.DecodeError."""
-        self._rest += data
-        while len(self._rest) >= _FRAME.size:
-            kind, length = _FRAME.unpack_from(self._rest)
+        self._parts.append(data)
+        self._size += len(data)
+        while self._size >= self._wanted:
+            joined = b"".join(self._parts)  # once for the header, once for the frame
+            kind, length = _FRAME.unpack_from(joined)
             if length > FRAME_BYTES_MAX:
                 raise ValueError(f"a frame of {length} bytes")
             end = _FRAME.size + length
-            if len(self._rest) < end:
-                return
-            payload = bytes(self._rest[_FRAME.size : end])
-            del self._rest[:end]
-            yield self._command(kind, payload)
+            is_whole = self._size >= end
+            rest = joined[end:] if is_whole else joined
+            self._parts, self._size = [rest], len(rest)
+            self._wanted = _FRAME.size if is_whole else end
+            if is_whole:
+                yield self._command(kind, memoryview(joined)[_FRAME.size : end])
 
-    def _command(self, kind: int, payload: bytes) -> WriterCommand:
+    def _command(self, kind: int, payload: memoryview) -> WriterCommand:
         if kind == _OPEN:
             request = _OPEN_RUN.decode(payload)
             self._layout = request.layout
@@ -125,7 +130,7 @@ def _frame(kind: int, *payload: bytes | memoryview) -> bytes:
     return b"".join((_FRAME.pack(kind, sum(map(len, payload))), *payload))
 
 
-def _unpack_block(payload: bytes, layout: BlockLayout) -> RunBlock:
+def _unpack_block(payload: memoryview, layout: BlockLayout) -> RunBlock:
     (n,) = _ROWS.unpack_from(payload)
     position = _ROWS.size
 

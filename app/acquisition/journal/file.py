@@ -4,6 +4,7 @@ import contextlib
 import errno
 import logging
 import os
+import queue
 import threading
 import time
 from collections import deque
@@ -30,22 +31,46 @@ _ROOM_BYTES = 32 << 20
 
 
 class FileSync(threading.Thread):
-    """A sync of a file, which begins at once; the file may be closed meanwhile."""
+    """Syncs a file each time `begin` is called; the file may be closed meanwhile."""
 
     def __init__(self, descriptor: int) -> None:
         super().__init__(name="journal sync", daemon=True)
-        self.failure: OSError | None = None  # known when the thread has ended
-        self.began_s = time.perf_counter()
+        self.began_s: float | None = None
+        """When the sync began that is under way, by `time.perf_counter`; None for none."""
+        self._failure: OSError | None = None
+        self._is_idle = threading.Event()
+        self._is_idle.set()
+        self._goes_on: queue.SimpleQueue[bool] = queue.SimpleQueue()
         self._descriptor = os.dup(descriptor)
         self.start()
 
+    def begin(self) -> None:
+        """Begin a sync; none may be under way."""
+        self._is_idle.clear()
+        self.began_s = time.perf_counter()
+        self._goes_on.put(True)
+
+    def take_failure(self) -> OSError | None:
+        """Wait for the end of a sync that is under way; returns what failed since the last call."""
+        self._is_idle.wait()
+        failure, self._failure = self._failure, None
+        return failure
+
+    def end(self) -> None:
+        """End the thread, after the sync that is under way; waits only where there is none."""
+        self._goes_on.put(False)
+        if self._is_idle.is_set():  # Windows removes no file that is open
+            self.join()
+
     def run(self) -> None:
-        try:
-            sync_descriptor(self._descriptor)
-        except OSError as error:
-            self.failure = error
-        finally:
-            os.close(self._descriptor)
+        while self._goes_on.get():
+            try:
+                sync_descriptor(self._descriptor)
+            except OSError as error:
+                self._failure = error
+            self.began_s = None
+            self._is_idle.set()
+        os.close(self._descriptor)
 
 
 class JournalFile:
@@ -81,9 +106,9 @@ class JournalFile:
 
     @property
     def sync_began_s(self) -> float | None:
-        """When the sync began that is under way, by `time.perf_counter`; None for none."""
+        """As `FileSync.began_s`."""
         sync = self._sync
-        return sync.began_s if sync is not None and sync.is_alive() else None
+        return None if sync is None else sync.began_s
 
     def append(self, record: bytes) -> None:
         """Write a record. Raises OSError where no folder takes it."""
@@ -107,10 +132,12 @@ class JournalFile:
         """
         if not self._is_made:
             return True
-        if self._sync is not None and self._sync.is_alive():
+        if self.sync_began_s is not None:
             return False
         self._finish_sync()
-        self._sync = FileSync(self._file.fileno())
+        if self._sync is None:
+            self._sync = FileSync(self._file.fileno())
+        self._sync.begin()
         return True
 
     def sync(self) -> None:
@@ -124,14 +151,13 @@ class JournalFile:
             self._move(error)
 
     def _finish_sync(self) -> None:
-        sync, self._sync = self._sync, None
-        if sync is not None:
-            sync.join()
-            if sync.failure is not None:
-                self._move(sync.failure)
+        failure = None if self._sync is None else self._sync.take_failure()
+        if failure is not None:
+            self._move(failure)
 
     def close(self) -> None:
         if self._sync is not None:
+            self._sync.end()
             self._sync.join()
         if self._is_made:
             self._file.close()
@@ -186,12 +212,14 @@ class JournalFile:
 
     def _move_to(self, path: Path) -> None:
         file, lock = _make_file(path, self._copy_to)
+        if self._sync is not None:
+            self._sync.end()
+            self._sync = None  # one of the old file that fails now does not concern the new one
         with contextlib.suppress(OSError):
             self._file.close()
         if self._is_copied:  # its run file may need the space
             self.remove()
         self.release()
-        self._sync = None  # one of the old file that fails now does not concern the new one
         self.path, self._file, self._lock = path, file, lock
 
     def _copy_to(self, file: IO[bytes]) -> None:

@@ -51,15 +51,17 @@ class ReadQueue:
         """Add a read. Raises QueueFullError when thousands wait; the tap has this one too."""
         read = RawRead(arrival_ns, data)
         with self._changed:
-            if self._tap is not None:
+            is_full = len(self._waiting) >= _WAITING_READS
+            if not is_full:
+                self._waiting.append(read)
+                self._changed.notify()
+            if self._tap is not None:  # last, as it wakes up a thread that would wait for this one
                 self._tap(read)
-            if len(self._waiting) >= _WAITING_READS:
-                raise QueueFullError(
-                    "this computer is too slow: {reads} reads wait to be decoded. Close other programs",
-                    reads=_WAITING_READS,
-                )
-            self._waiting.append(read)
-            self._changed.notify()
+        if is_full:
+            raise QueueFullError(
+                "this computer is too slow: {reads} reads wait to be decoded. Close other programs",
+                reads=_WAITING_READS,
+            )
 
     def take(self, timeout_s: float) -> RawRead | None:
         with self._changed:

@@ -3,7 +3,7 @@
 import logging
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Self, TypeAlias
 
 import numpy as np
@@ -243,7 +243,7 @@ class LiveStream:
             raise StreamEndedError(EndReason.DEVICE_LOST, message_of(error)) from error
         rows = tuple(calibrate(block, self._gauges) for block in blocks)
         self._events.extend(StreamNotice(as_message(note)) for note in self._source.take_warnings())
-        before, self.losses = self.losses, replace(self._source.losses)
+        before, self.losses = self.losses, self._source.losses
         added = self.losses - before
         if added.restarts:
             self._rate_monitor.restart()

@@ -78,12 +78,13 @@ class RateMonitor:
             and (self._known is None or _is_better(present, self._known))
         ):
             self._known = present
-        return self._known or self._quick
+        self._recent, self._recent_ns = self._known or self._quick, self._latest_ns
+        return self._recent
 
     def recent(self) -> ClockEstimate | None:
         """As `estimate`, but up to a second old, because an estimate costs much."""
         if self._recent is None or self._latest_ns - self._recent_ns > _RECENT_S * 1e9:
-            self._recent, self._recent_ns = self.estimate(), self._latest_ns
+            return self.estimate()
         return self._recent
 
     def add(self, index: int, arrival_ns: int) -> Message:

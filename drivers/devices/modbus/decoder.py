@@ -1,6 +1,7 @@
 """Responses of a polled transmitter, in envelopes with their time, decoded to sample blocks."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -56,7 +57,7 @@ class ResponseDecoder(Decoder):
 
     @property
     def losses(self) -> Losses:
-        return self._losses
+        return replace(self._losses)
 
     @property
     def unfinished_bytes(self) -> int:

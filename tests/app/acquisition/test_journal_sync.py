@@ -25,12 +25,15 @@ def test_a_file_may_be_closed_while_it_is_synced(file, monkeypatch):
     monkeypatch.setattr("app.acquisition.journal.file.os.fsync", fsync)
     inode = os.fstat(file.fileno()).st_ino
     sync = FileSync(file.fileno())
+    sync.begin()
     file.close()
-    assert sync.is_alive()
+    sync.end()
+    assert sync.began_s is not None
     may_go_on.set()
+    assert sync.take_failure() is None
     sync.join()
     assert synced == [inode]
-    assert sync.failure is None
+    assert sync.began_s is None
 
 
 def test_a_failure_is_known_afterwards(file, monkeypatch):
@@ -39,6 +42,10 @@ def test_a_failure_is_known_afterwards(file, monkeypatch):
 
     monkeypatch.setattr("app.acquisition.journal.file.os.fsync", fsync)
     sync = FileSync(file.fileno())
-    sync.join()
-    assert sync.failure is not None
-    assert sync.failure.errno == errno.EIO
+    sync.begin()
+    failure = sync.take_failure()
+    assert failure is not None
+    assert failure.errno == errno.EIO
+    assert sync.take_failure() is None, "it was told"
+    sync.end()
+    assert not sync.is_alive()

@@ -19,8 +19,17 @@ from tests.app.acquisition.test_recording import RELEASED, Bench, RememberingWri
 
 pytestmark = pytest.mark.usefixtures("no_thread_is_left")
 
+
 READ = 5
 """Samples of each read of the bench."""
+
+
+@pytest.fixture(autouse=True, scope="module")
+def small_batches():
+    """Hands rows over often, so that a short run has many batches."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("app.acquisition.run_file._BATCH_S", 0.05)
+        yield
 
 
 class FullWriter(RememberingWriter):
@@ -126,7 +135,7 @@ def fail(_handle) -> None:
 
 def test_marked_rows_that_are_lost_are_not_told_of_either(tmp_path):
     fails = threading.Event()
-    bench = Bench(tmp_path, run_of(tmp_path), writer=FullWriter(takes=3, stores=2))
+    bench = Bench(tmp_path, run_of(tmp_path), writer=FullWriter(takes=4, stores=3))
     bench.status[READ * 10 :] = SampleStatus.OVERLOAD_TABLE
     fill(bench, 0, fails)
     bench.play(1000)

@@ -63,6 +63,7 @@ class RememberingWriter:
         self.ending = None
         self.open_error = open_error
         self.append_error = append_error
+        self.failure = append_error if isinstance(append_error, DiskFullError) else None  # of its process
         self.raw_bytes_stored = raw_bytes_stored
 
     def open(self, request):
