@@ -83,6 +83,7 @@ class Desk:
         self._writer = writer
         self._source = find_driver(protocol).make_source({}, RATE_HZ)
         self._losses = Losses()
+        self._gauges = load_gauges()
         self.intake = ReadQueue()
         self.history = ReadHistory(round(history_s * RATE_HZ))
         self.recording: Recording | None = None
@@ -94,7 +95,7 @@ class Desk:
         )
         now = datetime.datetime.now().astimezone()
         metadata = create_metadata(
-            load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ, operator="J. Ng", note="dry"
+            load_stand(), self._gauges, now, series=run.series, rate_hz=RATE_HZ, operator="J. Ng", note="dry"
         )
         header = JournalHeader(self.port, run, metadata, IDENTIFIER, "test")
         self._journal = create_journal(self.journal, header)
@@ -115,7 +116,7 @@ class Desk:
         read = self.intake.take(0.0)
         assert read is not None
         arrival_ns, data = read.arrival_ns, read.data
-        rows = tuple(calibrate(block, load_gauges()) for block in self._source.decode(data, arrival_ns))
+        rows = tuple(calibrate(block, self._gauges) for block in self._source.decode(data, arrival_ns))
         before, self._losses = self._losses, Losses(**_fields(self._source.losses))
         chunk = DecodedRead(data, arrival_ns, rows, self._losses - before)
         self.history.add(chunk)

@@ -105,6 +105,7 @@ class Bench:
         self, folder, run=None, *, writer=None, heard=0, history_s=10.0, time_base=TIMED, status=None
     ):
         self.writer = writer or RememberingWriter()
+        self.gauges = load_gauges()
         self.intake = ReadQueue()
         self.history = ReadHistory(round(history_s * RATE_HZ))
         self.events = []
@@ -114,7 +115,7 @@ class Bench:
         self.play(heard)
         run = run or RunSettings(str(folder), series="1FFM0", duration_s=1.0)
         now = datetime.datetime.now().astimezone()
-        metadata = create_metadata(load_stand(), load_gauges(), now, series=run.series, rate_hz=RATE_HZ)
+        metadata = create_metadata(load_stand(), self.gauges, now, series=run.series, rate_hz=RATE_HZ)
         header = JournalHeader(PortSettings("port", "csv"), run, metadata, "a-uuid", "test")
         self.journal = create_journal(folder / "run.journal", header)
         around = RecordingContext(
@@ -129,7 +130,7 @@ class Bench:
             block = SampleBlock(self.next, COUNTS[part], self.status[part], 0)
             lost = Losses(missing_estimated=int(np.count_nonzero(self.status[part] & SampleStatus.MISSING)))
             chunk = DecodedRead(
-                b"%d;" % self.next, time.monotonic_ns(), (calibrate(block, load_gauges()),), lost
+                b"%d;" % self.next, time.monotonic_ns(), (calibrate(block, self.gauges),), lost
             )
             self.intake.put(chunk.arrival_ns, chunk.data)
             self.intake.take(0.0)
