@@ -1,6 +1,7 @@
 """Puts the fakes of this folder (`stage.py`) within reach of the tests below it."""
 
 import datetime
+import itertools
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -50,18 +51,27 @@ def keep_interrupts() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.fixture(scope="session")
+def unused_folders(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Folders to make. `mktemp` would look for the next number among those of all tests before, each time."""
+    parent = tmp_path_factory.mktemp("own")
+    return (parent / str(number) for number in itertools.count())
+
+
 @pytest.fixture(autouse=True)
-def cache_folder(tmp_path_factory, monkeypatch):
+def cache_folder(unused_folders, monkeypatch):
     """A cache folder of the test's own, so that no index is left in the user's."""
-    place = tmp_path_factory.mktemp("cache")
+    place = next(unused_folders)
+    place.mkdir()
     monkeypatch.setattr("platformdirs.user_cache_dir", lambda *_arguments, **_options: str(place))
     return place
 
 
 @pytest.fixture(autouse=True)
-def data_folder(tmp_path_factory, monkeypatch):
+def data_folder(unused_folders, monkeypatch):
     """A data folder of the test's own on Linux and Windows, for the processes that it starts too."""
-    place = tmp_path_factory.mktemp("data")
+    place = next(unused_folders)
+    place.mkdir()
     for name in ("XDG_DATA_HOME", "WIN_PD_OVERRIDE_LOCAL_APPDATA"):  # the latter is platformdirs' own
         monkeypatch.setenv(name, str(place))
     return place
