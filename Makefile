@@ -21,7 +21,7 @@ DESKTOP_TEST_PACKAGES := xvfb openbox xdotool xclip
 # What logs the system calls that the drill of a power cut rebuilds disks from, and mounts a disk that hangs.
 TEST_PACKAGES := strace bindfs gcc libc6-dev
 
-.PHONY: same-python audit licences wheel drill-tools test-tools docs translations help setup installed run test lint types types-host types-win32 types-darwin compiled bench bench-recording bench-desktop peers windows packages try-packages quick-environment quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
+.PHONY: same-python audit licences wheel drill-tools test-tools docs translations help setup installed run test lint types types-host types-win32 types-darwin compiled collected bench bench-recording bench-desktop peers windows packages try-packages quick-environment quick-test screenshots study drill lock system-libraries firmware firmware-tools desktop-tools
 
 help:
 	@echo "make setup   virtual environment .venv with the locked packages, and what Qt needs of the system"
@@ -145,6 +145,11 @@ quick-test: quick-environment
 compiled: installed
 	@$(BIN)/python -m tools.compile_all
 	@touch $(COMPILED)
+
+# Tests with their assertions rewritten, on disk, before workers that start at once would each do it. What cannot be
+# collected is said by `make test`.
+collected: compiled
+	@$(BIN)/python -m pytest tests --collect-only -q >/dev/null || true
 
 lint: types
 	$(BIN)/ruff check .
