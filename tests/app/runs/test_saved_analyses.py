@@ -1,5 +1,7 @@
 import json
 import math
+import shutil
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -45,10 +47,31 @@ RESULT = Identification(
 )
 
 
+@pytest.fixture(scope="module")
+def stored_run(tmp_path_factory, metadata):
+    path = tmp_path_factory.mktemp("stored") / "run.h5"
+    write_run(path, metadata, block(0, 100), ENDING)
+    return path
+
+
+@pytest.fixture(scope="module")
+def analysed_run(stored_run, tmp_path_factory):
+    path = Path(shutil.copy(stored_run, tmp_path_factory.mktemp("analysed")))
+    run = open_run(path)
+    save_analysis(path, _document(run), inputs_hash(to_record(run)), {"model": "auto"})
+    return path
+
+
 @pytest.fixture
-def run_path(tmp_path, metadata):
-    write_run(tmp_path / "run.h5", metadata, block(0, 100), ENDING)
-    return tmp_path / "run.h5"
+def run_path(stored_run, tmp_path):
+    """A run of the test's own."""
+    return Path(shutil.copy(stored_run, tmp_path))
+
+
+@pytest.fixture
+def analysed_path(analysed_run, tmp_path):
+    """A run of the test's own with a result kept in it."""
+    return Path(shutil.copy(analysed_run, tmp_path))
 
 
 def _document(run):
@@ -180,17 +203,16 @@ def _add(path, value):
         _set_cell("warnings/code", 0, b"no-slip"),
     ],
 )
-def test_a_result_whose_fields_differ_from_its_text_is_not_taken(run_path, change, has_checksum):
-    run = open_run(run_path)
-    save_analysis(run_path, _document(run), inputs_hash(to_record(run)), {"model": "auto"})
-    with h5py.File(run_path, "r+") as file:
+def test_a_result_whose_fields_differ_from_its_text_is_not_taken(analysed_path, change, has_checksum):
+    with h5py.File(analysed_path, "r+") as file:
         if not has_checksum:
             del file["entry/analysis_001/crc32"]
+        assert len(read_all_analyses(file)[0]) == 1
         assert read_all_analyses(file)[1] == ()
         change(file["entry/analysis_001"])
 
-    assert open_run(run_path).analyses == ()
-    assert shared_validator().validate(run_path).damaged_analyses == 1
+    assert open_run(analysed_path).analyses == ()
+    assert shared_validator().validate(analysed_path).damaged_analyses == 1
 
 
 def test_an_analysis_of_a_version_without_checksum_is_taken(run_path):
