@@ -6,10 +6,11 @@ that has LDAQ, which needs more packages than Slipstand wants to have, and is in
     python -m venv /tmp/ldaq && /tmp/ldaq/bin/pip install LDAQ==1.3.2
 
 A feeder sends Slipstand binary frames of 32 samples at a steady rate; what the terminal does not take is
-lost, as on a UART. Each reader reads them for some seconds in a process of its own. Ours checks CRC and
-sequence, lays out gaps and hands on blocks. LDAQ's `SerialAcquisition.run_acquisition` (called directly: its
-`Core` wants a keyboard and a window) splits at the frames' beginning, unpacks with `struct`, checks nothing,
-and fills its ring buffer. Loss is counted from the sequence numbers that came through after 0.3 s.
+lost, as on a UART. Each reader reads them for some seconds in a process of its own. Ours reads as the engine
+does, checks CRC and sequence, lays out gaps and hands on blocks. LDAQ's `SerialAcquisition.run_acquisition`
+(called directly: its `Core` wants a keyboard and a window) splits at the frames' beginning, unpacks with
+`struct`, checks nothing, and fills its ring buffer. Loss is counted from the sequence numbers that came
+through after 0.3 s.
 """
 
 import argparse
@@ -42,12 +43,15 @@ from drivers.devices.slipstand_binary.codec import FrameDecoder
 from drivers.devices.slipstand_binary.source import make_source
 
 port_name, rate, seconds = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
-make_source({}, rate).prepare()
+source = make_source({}, rate)
+source.prepare()
 print("ready", flush=True)
 reads = queue.SimpleQueue()
 decoder, skipped, samples = FrameDecoder(rate), None, 0
 with open_port(port_name, 460800) as port:
-    reader = PortReader(port.read, lambda arrival_ns, data: reads.put((arrival_ns, data)), lambda ended: None)
+    source.batch_delay_s, source.collect_limit = 0.015, port.collect_limit  # as an engine with a window
+    keep = lambda arrival_ns, data: reads.put((arrival_ns, data))
+    reader = PortReader(lambda: source.read(port), keep, lambda ended: None)
     used, end = resource.getrusage(resource.RUSAGE_SELF), time.monotonic() + seconds
     reader.start()
     while time.monotonic() < end:
@@ -89,15 +93,18 @@ print(json.dumps({"samples": len(sequence) * n, "lost": lost, "cpu_s": cpu_s}))
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--ldaq", metavar="PYTHON", help="interpreter that has LDAQ; ours alone without")
+    parser.add_argument("--turns", type=int, default=4)
     chosen = parser.parse_args()
     readers = {"Slipstand": (sys.executable, OURS)} | ({"LDAQ": (chosen.ldaq, LDAQ)} if chosen.ldaq else {})
     print(f"load {os.getloadavg()[0]:.1f}, {os.cpu_count()} cores")
     costs = " | ".join(f"cpu a 1e6 samples at {rate / 1000:g} kHz, s" for rate in COSTED_HZ)
-    print(f"| reader | highest rate without loss, Hz | first loss | {costs} |")
-    print(f"|---|---|---|{'---|' * len(COSTED_HZ)}")
-    for name, reader in readers.items():
-        cells = [cost(read(*reader, frames(rate_hz), rate_hz)) for rate_hz in COSTED_HZ]
-        print(f"| {name} | {' | '.join([*climb(*reader), *cells])} |", flush=True)
+    print(f"| turn | reader | highest rate without loss, Hz | first loss | {costs} | load |")
+    print(f"|---|---|---|---|{'---|' * len(COSTED_HZ)}---|")
+    for turn in range(chosen.turns):
+        for name, reader in readers.items():
+            cells = [cost(read(*reader, frames(rate_hz), rate_hz)) for rate_hz in COSTED_HZ]
+            cells = [str(turn + 1), name, *climb(*reader), *cells, f"{os.getloadavg()[0]:.1f}"]
+            print(f"| {' | '.join(cells)} |", flush=True)
 
 
 def climb(python: str, code: str) -> tuple[str, str]:
