@@ -164,9 +164,8 @@ def _one_kill(
             _await_file(folder)
             time.sleep(moments.uniform(0.0, 0.1 if aim is Aim.MAKING else DURATION_S / 2))
         children = children_of(engine.process_id)
-        sent = truth_of_now(stand).wire
-        if aim is Aim.FLUSH:
-            _await_write(folder, moments.uniform(0.0, 1e-3))
+        later_s = moments.uniform(0.0, 4e-3) if aim is Aim.FLUSH else None
+        sent = truth_of_now(stand).wire if later_s is None else _await_write(folder, stand, later_s)
         for process_id in children if with_writer else ():
             with contextlib.suppress(ProcessLookupError):
                 os.kill(process_id, signal.SIGKILL)
@@ -185,14 +184,22 @@ def _await_file(folder: Path, patience_s: float = 60.0) -> None:
         time.sleep(0.001)
 
 
-def _await_write(folder: Path, later_s: float, patience_s: float = 1.0) -> None:
-    """Wait until the run file is written to, and so much longer; not at all where there is none to come."""
+def _await_write(
+    folder: Path, stand: SimulatedStand, later_s: float, patience_s: float = 3.0
+) -> TransmissionLog:
+    """Wait until the run file is written to, and so much longer; not at all where there is none to come.
+
+    Returns what the stand had sent within the tenth of a second before.
+    """
     path = next(folder.glob("*.h5"), None)
-    deadline = time.monotonic() + patience_s
+    sent, asked = truth_of_now(stand).wire, time.monotonic()
+    deadline = asked + patience_s
     before = path.stat().st_mtime_ns if path else 0
     while path and path.stat().st_mtime_ns == before and time.monotonic() < deadline:
-        pass  # for less than a tenth of a second
+        if time.monotonic() - asked > 0.1:
+            sent, asked = truth_of_now(stand).wire, time.monotonic()
     time.sleep(later_s)
+    return sent
 
 
 def _check(killed: Kill, unread_s: float, stand: SimulatedStand, sent: Sent, report: KillReport) -> None:
