@@ -45,12 +45,15 @@ LONGEST_PATH = 239 if sys.platform == "win32" else None
 """Windows takes 259 characters unless it is set up otherwise; names of unfinished files are 20 longer."""
 
 
-def reserve_space(path: Path, size: int, more: int) -> None:
+def reserve_space(path: Path, size: int, more: int) -> int:
     """Make sure that a file of `size` bytes can grow by `more`. Raises DiskFullError or WriteError.
+
+    Returns the size to which it can grow whatever happens on the disk: on Linux `size + more`, elsewhere 0.
 
     HDF5 can crash after a failed write, so none of its writes may be the first to find the disk full. Linux
     claims the blocks behind the end of the file, which also respects quotas; HDF5 accepts such a file.
     """
+    reserved_size = 0
     try:
         if sys.platform == "linux":
             handle = os.open(path, os.O_RDWR)  # read by the C library where the file system reserves nothing
@@ -58,10 +61,12 @@ def reserve_space(path: Path, size: int, more: int) -> None:
                 os.posix_fallocate(handle, size, more)
             finally:
                 os.close(handle)
+            reserved_size = size + more
         else:
             check_free_space(path.parent, more)
     except OSError as error:
         raise storage_error(path, error) from None
+    return reserved_size
 
 
 def check_free_space(folder: Path, more: int) -> None:

@@ -153,6 +153,7 @@ class RunWriter:
         self._pending: list[Columns] = []
         self._pending_bytes = 0
         self._flushed_at = time.perf_counter()
+        self._reserved_size = 0
 
     def append(self, block: RunBlock) -> None:
         """Add rows; they are on disk within 100 ms if this or `flush_if_due` is called meanwhile.
@@ -161,7 +162,7 @@ class RunWriter:
         """
         columns = block.columns(self._layout)
         pending_bytes = self._pending_bytes + sum(column.nbytes for column in columns)
-        self._reserve(pending_bytes)
+        self._reserve(pending_bytes, ahead=pending_bytes + disk.MARGIN_BYTES)
         self._pending.append(columns)
         self._pending_bytes = pending_bytes
         self.losses += count_flags(block.status)
@@ -235,9 +236,21 @@ class RunWriter:
             self._checksums[path] = zlib.crc32(column.data, self._checksums[path])
         self._pending, self._pending_bytes = [], 0
 
-    def _reserve(self, upcoming: int) -> None:
+    def _reserve(self, upcoming: int, ahead: int = 0) -> None:
+        """Reserve room for what is written next, and `ahead` bytes where there is room for them too.
+
+        Rows that come when the disk has become full take what was reserved ahead. Raises DiskFullError,
+        WriteError.
+        """
+        size = self._file.id.get_filesize()
         chunks = sum(dataset.chunks[0] * dataset.dtype.itemsize for dataset in self._columns)
-        disk.reserve_space(self.path, self._file.id.get_filesize(), upcoming + chunks + disk.MARGIN_BYTES)
+        needed = upcoming + chunks + disk.MARGIN_BYTES
+        if size + needed <= self._reserved_size:
+            return
+        try:
+            self._reserved_size = disk.reserve_space(self.path, size, needed + ahead)
+        except DiskFullError:
+            self._reserved_size = disk.reserve_space(self.path, size, needed)
 
     def _copy_raw_bytes(self) -> bool:
         """Copy the journal's bytes; False without a readable journal or without room for them."""

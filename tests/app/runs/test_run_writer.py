@@ -86,22 +86,34 @@ def test_what_is_flushed_is_readable_from_a_copy(tmp_path, metadata):
     assert np.array_equal(run.time_s, block(0, 9000).time_s)
 
 
+def full(*_):
+    raise DiskFullError("full")
+
+
 def test_a_full_disk_keeps_what_came_before(tmp_path, metadata, monkeypatch):
     writer = create_run(tmp_path / "run.h5", metadata)
     writer.append(block(0, 100))
-
-    def full(*_):
-        raise DiskFullError("full")
-
     with monkeypatch.context() as patch:
         patch.setattr(disk, "reserve_space", full)
         with pytest.raises(DiskFullError):
-            writer.append(block(100, 100))
+            writer.append(block(100, 200_000))
     writer.interrupt("disk-full", "no room")
 
     run = open_run(writer.path, trusted=True)
     assert len(run) == 100
     assert (run.end.ended, run.end.message) == ("disk-full", "no room")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems reserve nothing")
+def test_rows_that_come_when_the_disk_is_full_take_what_was_reserved_before(tmp_path, metadata, monkeypatch):
+    writer = create_run(tmp_path / "run.h5", metadata)
+    writer.append(block(0, 4000))
+    monkeypatch.setattr(disk, "reserve_space", full)
+    writer.append(block(4000, 4000))
+    assert writer._file.id.get_filesize() < writer.path.stat().st_size
+    stored = writer.close(ENDING)
+    assert (stored.samples, len(open_run(writer.path, trusted=True))) == (8000, 8000)
+    assert writer.path.stat().st_size < 1_000_000, "what was not needed is given back"
 
 
 def test_a_folder_that_cannot_be_written_to(tmp_path, metadata):
