@@ -140,9 +140,9 @@ def kill_engine(
             inside = folder / f"{kind}-{rate_hz:g}-{number:03d}"
             inside.mkdir()
             try:
-                with Starving(moments, starve) as starving:
+                with Starving(moments, starve, lambda: truth_of_now(stand).wire.samples) as starving:
                     killed = _one_kill(stand, port, inside, kind, moments)
-                _check(killed, starving.unread_s(killed.killed_s), stand, sent, report)
+                _check(killed, starving.readable_samples(killed.killed_s), stand, sent, report)
             except (AssertionError, ValueError, TimeoutError, RunError) as error:
                 report.faults.append(f"{kind} run {number} at {rate_hz:g} Hz in {inside}: {error}")
     return report
@@ -202,7 +202,9 @@ def _await_write(
     return sent
 
 
-def _check(killed: Kill, unread_s: float, stand: SimulatedStand, sent: Sent, report: KillReport) -> None:
+def _check(
+    killed: Kill, readable_samples: int | None, stand: SimulatedStand, sent: Sent, report: KillReport
+) -> None:
     """Hold what is left, and what is recovered from it, against what was sent."""
     report.kills += 1
     report.with_writer += killed.with_writer
@@ -234,8 +236,8 @@ def _check(killed: Kill, unread_s: float, stand: SimulatedStand, sent: Sent, rep
         raise ValueError(f"{len(left)} rows were there, {len(run)} are left")
     next_sample = _check_rows(run, stand, sent)
     if run.end is not None and run.end.ended == "interrupted":
-        lost_s = max(0, killed.sent.samples - next_sample) / killed.sent.rate_hz
-        report.lost_s.append(max(0.0, lost_s - unread_s))
+        readable = killed.sent.samples if readable_samples is None else readable_samples
+        report.lost_s.append(max(0, readable - next_sample) / killed.sent.rate_hz)
         if report.lost_s[-1] > LOST_LIMIT_S:
             raise ValueError(f"the last {report.lost_s[-1] * 1e3:.0f} ms before the kill are lost")
 

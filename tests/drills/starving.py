@@ -6,7 +6,8 @@ import random
 import signal
 import threading
 import time
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -34,6 +35,8 @@ class Stop:
     roles: tuple[str, ...]
     began_s: float
     ended_s: float = float("inf")
+    sent_samples: int = 0
+    """What the stand had sent just before, where it was asked."""
 
 
 class Starving:
@@ -44,10 +47,18 @@ class Starving:
     moments : random.Random
     roles : sequence of str
         Of `ROLES`, whose processes are stopped; without any nothing is done.
+    sent_samples : callable, optional
+        Asks how many samples the stand has sent, before each stop of the engine.
     """
 
-    def __init__(self, moments: random.Random, roles: tuple[str, ...] = tuple(ROLES)) -> None:
+    def __init__(
+        self,
+        moments: random.Random,
+        roles: tuple[str, ...] = tuple(ROLES),
+        sent_samples: Callable[[], int] = lambda: 0,
+    ) -> None:
         self.stops: list[Stop] = []
+        self._sent_samples = sent_samples
         self._moments = random.Random(moments.random()) if roles else moments
         self._roles = roles
         self._known: set[int] = set()
@@ -66,14 +77,16 @@ class Starving:
         if self._roles:
             self._thread.join()
 
-    def unread_s(self, until_s: float, margin_s: float = 0.3) -> float:
-        """How long the engine had not read when it was killed, for having been stopped shortly before."""
-        began_s = [
-            stop.began_s
-            for stop in self.stops
-            if "engine" in stop.roles and stop.began_s < until_s < stop.ended_s + margin_s
-        ]
-        return until_s - min(began_s, default=until_s)
+    def readable_samples(self, until_s: float, margin_s: float = 0.3) -> int | None:
+        """Samples sent before a stop in or shortly after which the engine was killed; None without one.
+
+        A stand that was stopped too sends what it had not, so the length of a stop does not tell how many
+        samples came during it.
+        """
+        for stop in self.stops:
+            if "engine" in stop.roles and stop.began_s < until_s < stop.ended_s + margin_s:
+                return stop.sent_samples
+        return None
 
     def _starve(self) -> None:
         while not self._ending.wait(self._moments.uniform(*_PAUSES_S)):
@@ -85,7 +98,8 @@ class Starving:
         if not processes:
             return
         length_s = self._moments.uniform(*(STAND_STOPS_S if "stand" in roles else STOPS_S))
-        self.stops.append(Stop(roles, time.monotonic()))
+        sent_samples = self._sent_samples() if "engine" in roles else 0
+        self.stops.append(Stop(roles, time.monotonic(), sent_samples=sent_samples))
         try:
             for process_id in processes:
                 _send(process_id, signal.SIGSTOP)
@@ -93,7 +107,7 @@ class Starving:
         finally:
             for process_id in processes:
                 _send(process_id, signal.SIGCONT)
-        self.stops[-1] = Stop(roles, self.stops[-1].began_s, time.monotonic())
+        self.stops[-1] = replace(self.stops[-1], ended_s=time.monotonic())
 
     def _processes(self, roles: tuple[str, ...]) -> list[int]:
         """Those of these roles; also of an engine whose owner is gone, which nobody here has started."""
