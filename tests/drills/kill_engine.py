@@ -2,9 +2,9 @@
 
 After each kill the file must open as it was left, and `recover` must give a run whose every row is what the
 stand sent at that place. Lost is what the stand had sent when it was asked, just before the kill. A quarter
-of the moments lies in the making of the run file, half of them in one of its flushes, both with the writer,
-so that nobody closes the file; the others fall anywhere from arming to closing, half of them with the writer.
-No process of the dead engine may stay.
+of the moments lies in the making of the run file, half of them within 4 ms of one of its flushes, both with
+the writer, so that nobody closes the file; the others fall anywhere from arming to closing, half of them with
+the writer. No process of the dead engine may stay.
 """
 
 import contextlib
