@@ -1,31 +1,50 @@
-"""Import of numba without modules that it only looks for, one of which takes longer to import than numba."""
+"""Import of numba and msgspec without what they only look for, which takes as long to import as they do."""
 
 import sys
+from importlib.machinery import ModuleSpec
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 _OPTIONAL = {
+    "scipy": ("numba", "__version__"),
     "scipy.linalg": ("numba.np.arraymath", "_HAVE_BLAS"),
+    "typing_extensions": ("msgspec._utils", "get_type_hints"),
     "yaml": ("numba.core.config", "_HAVE_YAML"),
 }
-"""Modules that numba tries to import, the module of numba that does, and where it keeps whether it could."""
+"""Modules that are tried, the module that tries it, and a name that is defined in that one afterwards."""
+_EXTENSIONS = "numba.core.entrypoints"
 _NUMBA_SETTINGS = Path(".numba_config.yaml")  # numba reads it in the current folder, if it is there
 
 
-class _NotForNumba:
+class _LeanImport:
     """Refuses those attempts. Numba loads scipy.linalg later where it compiles a product of matrices.
 
-    A `MetaPathFinder` without that base class, whose module takes 0.01 s to import.
+    A `MetaPathFinder` without that base class, as its loader is one without its own: their module takes
+    0.01 s to import.
     """
 
-    def find_spec(self, name: str, *_: Any) -> None:
+    def find_spec(self, name: str, *_: Any) -> ModuleSpec | None:
+        if name == _EXTENSIONS:
+            return ModuleSpec(name, _NoExtensions())  # type: ignore[arg-type]  # as above
         asking, answer = _OPTIONAL.get(name, ("", ""))
         if asking not in sys.modules or hasattr(sys.modules[asking], answer):
-            return
-        if name == "scipy.linalg" or not _NUMBA_SETTINGS.exists():
-            raise ModuleNotFoundError(f"not imported for {asking}", name=name)
+            return None
+        if name == "yaml" and _NUMBA_SETTINGS.exists():
+            return None
+        raise ModuleNotFoundError(f"not imported for {asking}", name=name)
+
+
+class _NoExtensions:
+    """Numba without extensions: it looks for them in all installed packages, and we have none."""
+
+    def create_module(self, _: ModuleSpec) -> None:
+        """Leave it to Python."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        vars(module)["init_all"] = lambda: None
 
 
 def install() -> None:
-    """Let numba be imported without them from now on."""
-    sys.meta_path.insert(0, _NotForNumba())
+    """Let numba and msgspec be imported without them from now on."""
+    sys.meta_path.insert(0, _LeanImport())

@@ -42,13 +42,19 @@ def rate_from_steps(steps_s: Floats, resolution_s: float = 0.0) -> float | None:
     """
     if len(steps_s) < MIN_STEPS:
         return None
-    median_s = float(np.median(steps_s))
+    median_s = _median(steps_s)
     longest_s = max(1.5 * median_s, median_s + resolution_s) * (1 + _ROUNDING)
     single_s = steps_s[(steps_s >= 0) & (steps_s <= longest_s)]
     span_s = float(single_s.sum())
     if len(single_s) < MIN_STEPS or span_s < MIN_SPAN_S:
         return None
     return float(f"{len(single_s) / span_s:.9g}")  # further digits are rounding errors
+
+
+def _median(values: Floats) -> float:
+    """Median of numbers without NaN. That of numpy imports numpy.ma, 0.02 s of each process that reads."""
+    middle = (len(values) - 1) // 2, len(values) // 2
+    return float(np.partition(values, middle)[middle[0] : middle[1] + 1].mean())
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,7 +153,7 @@ def fit_robust_line(x: Floats, y: Floats) -> RobustLine:
         sxx = float(dx @ dx)
         slope = float(dx @ y) / sxx
         residual = y - y.mean() - slope * dx
-        spread = float(np.median(np.abs(residual))) * _SIGMA_PER_MAD
+        spread = _median(np.abs(residual)) * _SIGMA_PER_MAD
         kept = np.abs(residual) <= max(_REJECT_SIGMAS * spread, _CLOCK_STEP_S)
         if kept.all():
             break

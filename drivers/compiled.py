@@ -4,7 +4,12 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
+from numba.core import types
 from numba.core.caching import FunctionCache
+from numba.extending import typeof_impl
+from numba.np.numpy_support import from_dtype, map_layout
+from numpy.typing import NDArray
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -41,3 +46,10 @@ def _compile(function: _Function, inline: bool) -> _Function:
     )(function)
     dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]
     return cast(_Function, dispatcher)
+
+
+@typeof_impl.register(np.ndarray)
+def _array_type(array: NDArray[Any], _: object) -> types.Array:
+    """Type of an array that is not masked. Numba's own function imports numpy.ma to refuse those: 0.02 s."""
+    kind = from_dtype(array.dtype)
+    return types.Array(kind, array.ndim, map_layout(array), readonly=not array.flags.writeable)
