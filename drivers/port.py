@@ -223,7 +223,7 @@ class Port:
     def __init__(self, wire: Any, url: str) -> None:
         self._wire = wire
         self._is_socket = url.lower().startswith("socket://")
-        # Direct reads of a POSIX terminal cost a third of pyserial's.
+        # Direct reads of a POSIX terminal cost half of those of pyserial, or less.
         is_terminal = sys.platform != "win32" and type(wire) is serial.Serial
         self._terminal: int | None = wire.fileno() if is_terminal else None
         self.url = url
