@@ -1,5 +1,5 @@
 """Everything that runs: acquisition, run files, command line, reports, desktop."""
 
-from app.numba_import import install
+from app.optional_imports import install
 
 install()

@@ -5,6 +5,7 @@ import sys
 
 from app.child import ONE_THREAD
 from app.interrupts import EXIT_CODE, LINE, follow_interrupts, ignore_interrupts
+from app.optional_imports import claim_process
 
 _RUN_SUFFIX = ".h5"
 _COMPLETION = "_SLIPSTAND_COMPLETE"  # set by a shell that asks for the next word of a command
@@ -25,6 +26,7 @@ def main() -> None:
 def _run() -> None:
     """Run what the arguments ask for. Nothing heavy is imported before it is known to be needed."""
     arguments = sys.argv[1:]
+    claim_process()
     for name, count in ONE_THREAD.items():
         os.environ.setdefault(name, count)
     if getattr(sys, "frozen", False):

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Iterator
 from typing import NoReturn
 
+from app.optional_imports import claim_process
+
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
 )
@@ -33,6 +35,7 @@ def loading() -> Iterator[None]:
 def run_child(module: str, *arguments: str) -> NoReturn:
     """Import a module of the program, call its `main`, and exit with what that returns."""
     sys.argv = [module, *arguments]
+    claim_process()
     with loading():
         main = importlib.import_module(module).main
     try:

@@ -1,12 +1,13 @@
 """Compilation of the inner loops of decoders."""
 
+import sys
 from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
-from numba.core import types
 from numba.core.caching import FunctionCache
+from numba.core.types import Array
 from numba.extending import typeof_impl
 from numba.np.numpy_support import from_dtype, map_layout
 from numpy.typing import NDArray
@@ -48,8 +49,13 @@ def _compile(function: _Function, inline: bool) -> _Function:
     return cast(_Function, dispatcher)
 
 
+_numba_array_type = typeof_impl.dispatch(np.ndarray)
+
+
 @typeof_impl.register(np.ndarray)
-def _array_type(array: NDArray[Any], _: object) -> types.Array:
-    """Type of an array that is not masked. Numba's own function imports numpy.ma to refuse those: 0.02 s."""
+def _array_type(array: NDArray[Any], context: object) -> Any:
+    """Type of an array. Numba's own function imports numpy.ma, 0.02 s, to refuse masked arrays."""
+    if "numpy.ma" in sys.modules:
+        return _numba_array_type(array, context)
     kind = from_dtype(array.dtype)
-    return types.Array(kind, array.ndim, map_layout(array), readonly=not array.flags.writeable)
+    return Array(kind, array.ndim, map_layout(array), readonly=not array.flags.writeable)

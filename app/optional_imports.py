@@ -1,4 +1,4 @@
-"""Import of numba and msgspec without what they only look for, which takes as long to import as they do."""
+"""Modules that numba and msgspec only look for, which take as long to import as they do, are left out."""
 
 import sys
 from importlib.machinery import ModuleSpec
@@ -14,17 +14,23 @@ _OPTIONAL = {
 }
 """Modules that are tried, the module that tries it, and a name that is defined in that one afterwards."""
 _EXTENSIONS = "numba.core.entrypoints"
+_ONLY_OURS = {_EXTENSIONS, "typing_extensions"}
+"""What other packages of a process need where ours is a library: their extensions of numba, their types."""
 _NUMBA_SETTINGS = Path(".numba_config.yaml")  # numba reads it in the current folder, if it is there
 
 
-class _LeanImport:
+class _OptionalImports:
     """Refuses those attempts. Numba loads scipy.linalg later where it compiles a product of matrices.
 
     A `MetaPathFinder` without that base class, as its loader is one without its own: their module takes
     0.01 s to import.
     """
 
+    is_our_process = False
+
     def find_spec(self, name: str, *_: Any) -> ModuleSpec | None:
+        if name in _ONLY_OURS and not self.is_our_process:
+            return None
         if name == _EXTENSIONS:
             return ModuleSpec(name, _NoExtensions())  # type: ignore[arg-type]  # as above
         asking, answer = _OPTIONAL.get(name, ("", ""))
@@ -45,6 +51,14 @@ class _NoExtensions:
         vars(module)["init_all"] = lambda: None
 
 
+_imports = _OptionalImports()
+
+
 def install() -> None:
-    """Let numba and msgspec be imported without them from now on."""
-    sys.meta_path.insert(0, _LeanImport())
+    """Let numba be imported without them from now on."""
+    sys.meta_path.insert(0, _imports)
+
+
+def claim_process() -> None:
+    """Leave out too what only other packages would need: this process is one of the program."""
+    _imports.is_our_process = True

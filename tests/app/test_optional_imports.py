@@ -6,7 +6,8 @@ from pathlib import Path
 
 _PROCESS = """
 import sys
-import app
+from app.optional_imports import claim_process
+claim_process()
 import numpy as np
 from drivers.clock import rate_from_steps
 from drivers.crc_slice import crc16_slice
@@ -34,3 +35,23 @@ def test_a_settings_file_of_numba_in_the_current_folder_is_read(tmp_path: Path) 
         [sys.executable, "-c", process], capture_output=True, text=True, check=False, cwd=tmp_path
     )
     assert (done.stdout.strip(), done.stderr) == ("3", "")
+
+
+def test_what_other_packages_of_a_process_need_is_left_to_them() -> None:
+    process = """
+import sys
+import slipstand
+slipstand.Record, slipstand.read_run
+import numba, numba.core.entrypoints, msgspec._utils, typing_extensions
+import numpy as np
+import drivers.compiled
+assert numba.core.entrypoints.__file__ and msgspec._utils._get_type_hints is typing_extensions.get_type_hints
+try:
+    numba.njit(lambda a: a)(np.ma.array([1.0], mask=[True]))
+except numba.TypingError as refused:
+    assert "masked" in str(refused).lower(), refused
+else:
+    raise AssertionError("a mask was passed over")
+"""
+    done = subprocess.run([sys.executable, "-c", process], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
