@@ -249,13 +249,13 @@ def spent_s(process_ids: list[int]) -> dict[int, float]:
 
 
 def waits(process_id: int) -> int:
-    """How often the threads of a process have waited until now."""
-    lines = (
-        line
-        for task in Path(f"/proc/{process_id}/task").iterdir()
-        for line in (task / "status").read_text().splitlines()
-    )
-    return sum(int(line.split()[1]) for line in lines if line.startswith("voluntary_ctxt_switches"))
+    """How often the threads of a process that are there have waited until now."""
+    count = 0
+    for task in Path(f"/proc/{process_id}/task").iterdir():
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # ended meanwhile
+            lines = (task / "status").read_text().splitlines()
+            count += sum(int(line.split()[1]) for line in lines if line.startswith("voluntary_ctxt_switches"))
+    return count
 
 
 if __name__ == "__main__":
